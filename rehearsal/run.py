@@ -27,7 +27,6 @@ from foosim.runtime.disk import Level
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.recording.writer import CaptureWriter
 from foosim.vhub.state.records import Closing
-from foosim.world.forms.registry import model_of
 from foosim.world.frame import Frame
 from foosim.world.start import Start
 
@@ -43,7 +42,7 @@ class Rehearsed:
 
 def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
     """Return the robots of n1 to nN, dealt in turn: first those that engines solve, then others, each in name order."""
-    rigid = sorted(name for name, robot in deployment.robots.items() if model_of(robot).is_rigid)
+    rigid = sorted(name for name, robot in deployment.robots.items() if robot.component_type.is_rigid)
     others = sorted(set(deployment.robots) - set(rigid))
     dealt: dict[str, list[str]] = {f"n{number + 1}": [] for number in range(nodes)}
     for place, name in enumerate([*rigid, *others]):

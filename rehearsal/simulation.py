@@ -18,10 +18,10 @@ from foosim.client.playing import Acting
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.channel_kinds import channel_codec
-from foosim.deployment.event_requests import event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import ClientSpec, Deployment
 from foosim.deployment.text.files import read_deployment_text
+from foosim.deployment.validate_network import event_text
 from foosim.node.physics.mesh_trial import check_shapes
 from foosim.protocol.messages import Received, Sent
 from foosim.rehearsal.stepping.carriers import Bypass, Carrier, EmulatedNetwork

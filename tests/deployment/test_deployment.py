@@ -12,10 +12,9 @@ from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
 from foosim.common.units import Pace
-from foosim.deployment.checks import DEPLOYMENT_KEYS
 from foosim.deployment.components import read_components
 from foosim.deployment.json_schema import deployment_schema_text
-from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.loader import DEPLOYMENT_KEYS, apply_sets, load_deployment
 from foosim.deployment.network.impairments import GammaJitter
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment

@@ -196,7 +196,8 @@ def test_the_report_of_a_hostile_file_is_bounded() -> None:
     assert keys[-1] == f"and more: only the first {PROBLEMS_MAX} problems are shown"
     robots = "".join(f"  a{number}: {{model: camera, sensors: {{}}}}\n" for number in range(600))
     names = ",".join(f"b{number}" for number in range(4000))
-    assert len(problems_of(f"robots:\n{robots}nodes: {{n: {{robots: [{names}]}}}}\n")) == PROBLEMS_MAX + 1
+    hostile = changed((10, f"{robots}  red.goal:"), (29, f"    robots: [{names}]"))
+    assert len(problems_of(hostile)) == PROBLEMS_MAX + 1
 
 
 def test_a_file_is_read_from_disk_within_its_bounds(tmp_path: Path) -> None:

@@ -122,7 +122,7 @@ def test_a_model_has_what_its_motion_needs(site: Path, motion: str) -> None:
 
 def test_a_rigid_model_that_may_not_share_a_solve_is_refused(site: Path) -> None:
     written(site, "model('crate', RobotSettings, is_rigid=True, couples=False)(Own)")
-    assert problems(DRONE) == [
+    assert problems(DRONE, "players={}") == [
         "robots.camera.model: a rigid model with couples=False, which is valid of rod, ball alone, 'own_form:Own'"
     ]
 

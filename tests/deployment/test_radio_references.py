@@ -10,15 +10,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from foosim.common.errors import DeploymentError
-from foosim.deployment.event_requests import BadEvent, event_text
 from foosim.deployment.loader import apply_sets, load_deployment, load_network
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.presets import PRESETS
 from foosim.deployment.network.radios import lora_longest
 from foosim.deployment.network.rules import Network
-from foosim.deployment.radio_checks import rule_findings, unheeded
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
+from foosim.deployment.validate_network import BadEvent, event_text, rule_findings, unheeded
 from tests.links.offered import TABLE, deployment_of
 
 EVERYBODY: Final = ("network.robots={'*': [r]}", "network.places={'*': [0 m, 0 m, 1 m]}")

@@ -11,7 +11,7 @@ import pytest
 
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.assembly.misfits import models_of
+from foosim.deployment.validate import models_of
 from foosim.world.forms import registry
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
