@@ -12,8 +12,7 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.expand import expand
 from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.deployment.text.yaml import locate_in, plain, plain_shared, read_tree
-from tests.deployment.halls import HEAD, PATROL, POSE, hall, problems_of
-from tests.deployment.test_templates import ROVER
+from tests.deployment.halls import HEAD, PATROL, POSE, ROVER, hall, problems_of
 
 MEMORY_BYTES_MAX = 64_000_000
 LARGE = HEAD.replace('"length": "40 m", "width": "25 m"', '"length": "1000 m", "width": "1000 m"')

@@ -17,11 +17,9 @@ from foosim.common.errors import BadValue
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.text.selection import Population, Selector, TooManyComparisons
 from foosim.world.models.rover import RoverRobot
-from tests.deployment.halls import PATROL, hall, long_robot, problems_of, same
-from tests.deployment.test_templates import ROVER
+from tests.deployment.halls import FLEET, PATROL, ROVER, hall, long_robot, same
 from tests.kinematic_yard import yard_text
 
-FLEET = ROVER + "robots:\n  rover: {like: rover, count: 12, x: -15 m, y: 10 m, spacing: {x: 1.25 m, y: -50 cm}}\n"
 PILOTS = f"  pilot: {{class: '{PATROL}', rate: 10 Hz, on: $robot, robots: {{$robot: [pose]}}}}\n"
 
 
@@ -99,57 +97,6 @@ def test_places_are_added_exactly_and_rounded_once(start: str, step: str, count:
         assert (robot.x, robot.y) == (float(exact), 2.0 + number)
 
 
-@pytest.mark.parametrize(
-    ("robots", "problems"),
-    [
-        ("r: {like: rover, count: 0, x: 1 m, y: 1 m}", ["8:27: robots.r.count: not a whole number from 1 to 4096, 0"]),
-        ("r: {like: rover, count: 4097, x: 1 m, y: 1 m}",
-         ["8:27: robots.r.count: not a whole number from 1 to 4096, 4097"]),
-        ("r: {like: rover, count: 1000000000, x: 1 m, y: 1 m}",
-         ["8:27: robots.r.count: not a whole number from 1 to 4096, 1000000000"]),
-        ("r: {like: rover, count: true, x: 1 m, y: 1 m}",
-         ["8:27: robots.r.count: not a whole number from 1 to 4096, true"]),
-        ("r: {like: rover, count: '3', x: 1 m, y: 1 m}",
-         ["8:27: robots.r.count: not a whole number from 1 to 4096, '3'"]),
-        ("r: {like: rover, count: 3000, x: 1 m, y: 1 m}\n  s: {like: rover, count: 3001, x: 1 m, y: 1 m}",
-         ["9:27: robots.s.count: with it there are 6001 robots, more than 4096, 3001"]),
-        ("abcdefghijklmnopqrstuvwxyz-123456: {like: rover, count: 3, x: 1 m, y: 1 m}",
-         ["8:3: robots.abcdefghijklmnopqrstuvwxyz-123456: its names have up to 35 characters, more than 32, "
-          "'abcdefghijklmnopqrstuvwxyz-123456-3'"]),
-        ("r: {like: rover, count: 3, x: 1 m, y: 1 m}\n  r-2: {like: rover, count: 2}",
-         ["9:22: robots.r-2: a count of what the count of r makes, 'count'"]),
-        ("r: {like: rover, spacing: {x: 1 m}, x: 1 m, y: 1 m}",
-         ["8:20: robots.r: a spacing of what has no count, 'spacing'"]),
-        ("r: {like: rover, count: 3, spacing: 1 m, x: 1 m, y: 1 m}",
-         ["8:39: robots.r.spacing: not a mapping, '1 m'"]),
-        ("r: {like: rover, count: 3, spacing: {heading: 1 m, x: 1 kg}, x: 1 m, y: 1 m}",
-         ["8:40: robots.r.spacing: not one of x, y, z, 'heading'",
-          "8:57: robots.r.spacing.x: not a length (a number and one of m, cm, mm, um, km); "
-          "kg measures a mass, '1 kg'"]),
-        ("r: {like: rover, count: 3, spacing: {z: 1 m, y: 1 m}, x: 1 m, y: 1 m}",
-         ["8:40: robots.r.spacing: unknown key (there are: x, y), 'z'"]),
-        ("r: {like: rover, count: 3, spacing: {z: 1 m, y: 1 m}, x: 1 m, y: 1 m}\n  r-3: {z: 4 m, charge: 9 %}",
-         ["8:40: robots.r.spacing: unknown key (there are: x, y), 'z'",
-          "9:9: robots.r-3: unknown key (there are: model, spare, tags, sensors, actuators, rules, x, y, heading, "
-          "charge), 'z'"]),
-        ("r: {like: rover, count: 3, spacing: {x: 1 m}, y: 1 m}", ["8:6: robots.r-1: missing key, 'x'"]),
-        ("r: {like: rover, count: 3, x: one, spacing: {x: 1 m}, y: 1 m}",
-         ["8:33: robots.r-1.x: not a length (a number and one of m, cm, mm, um, km), 'one'"]),
-        ("r: {like: rovr, count: 3, x: 1 m, y: 1 m}\n  r-2: {x: 4 m}",
-         ["8:13: robots.r.like: unknown template, 'rovr', nearest is 'rover'"]),
-        ("r: {like: rover, count: 3, x: 1 m, y: 1 m, spacing: {x: 20 m}}",
-         ["8:33: robots.r-2.x: the rover starts outside of the hall: valid are x from -20 to 20 m, "
-          "y from -12.5 to 12.5 m, '21 m, 1 m'",
-          "8:33: robots.r-3.x: the rover starts outside of the hall: valid are x from -20 to 20 m, "
-          "y from -12.5 to 12.5 m, '41 m, 1 m'"]),
-        ("r: {like: rover, count: 3, x: 1 m, y: 1 m, spacing: {x: 2 m}}\n  r-3: {x: 1.1 m}",
-         ["9:12: robots.r-3.x: the rover starts in the rover r-1, '1.1 m, 1 m'"]),
-        ("r: {like: rover, count: 3, x: 1 m, y: 1 m, spacing: {x: 2 m}}\n  r-4: {x: 1.1 m}",
-         ["9:8: robots.r-4: missing key, 'model'"]),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_with_a_fleet_is_said_where_it_is_written(robots: str, problems: list[str]) -> None:
-    assert problems_of(hall(f"{ROVER}robots:\n  {robots}\n")) == problems
 
 
 # --- selectors --------------------------------------------------------------------------------------------------------
@@ -232,28 +179,3 @@ def test_a_robot_called_rest_is_that_robot() -> None:
     assert owners("nodes: {one: {robots: [rest]}, two: {robots: [b]}}\n", robots) == {"rest": "one", "b": "two"}
 
 
-@pytest.mark.parametrize(
-    ("nodes", "problem"),
-    [
-        ("{a: {robots: ['*', 'rovr-*']}}",
-         "9:27: nodes.a.robots[1]: a selector that matches no robot, 'rovr-*', nearest is 'rover-1'"),
-        ("{a: {robots: ['*', rover-13..20]}}",
-         "9:27: nodes.a.robots[1]: a selector that matches no robot, 'rover-13..20', nearest is 'rover-10'"),
-        ("{a: {robots: [rover-20..13, rest]}}",
-         "9:22: nodes.a.robots[0]: a range that ends before it begins, 'rover-20..13'"),
-        ("{a: {robots: [rover-1..4]}, b: {robots: [rest, rover-4]}}",
-         "9:55: nodes.b.robots[1]: a robot with two owners, also of node a, 'rover-4'"),
-        ("{a: {robots: [rover-1..8]}, b: {robots: [rover-5..12]}}",
-         "9:49: nodes.b.robots[0]: a robot with two owners, also of node a, 'rover-5'"),
-        ("{a: {robots: [rover-1..8]}, b: {robots: [rover-10..12]}}",
-         "8:3: robots: a robot that no node owns, 'rover-9'"),
-        ("{a: {robots: ['*']}, b: {robots: [rest]}}",
-         "9:42: nodes.b.robots: each robot is in another list, none is left, 'rest'"),
-        ("{a: {robots: [rest]}, b: {robots: [rest]}}",
-         "9:43: nodes.b.robots: each robot is in another list, none is left, 'rest'"),
-        ("{a: {robots: [rovr-3, rest]}}",
-         "9:22: nodes.a.robots[0]: unknown robot, 'rovr-3', nearest is 'rover-3'"),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_with_a_nodes_robots_is_said_at_its_selector(nodes: str, problem: str) -> None:
-    assert problems_of(hall(f"{FLEET}nodes: {nodes}\n")) == [problem]

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment, load_network
 from foosim.deployment.network.link_settings import Profiles
-from foosim.deployment.network.presets import PRESETS
 from foosim.deployment.network.radios import lora_longest
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
@@ -58,14 +57,6 @@ def test_a_radio_is_not_asked_for_what_it_does_not_do(radio: str, problem: str) 
         load_network(f"network: {{radios: {{r: {{{radio}}}}}}}", "t")
 
 
-@pytest.mark.parametrize(
-    "radio",
-    [*(f"preset: {preset}" for preset in PRESETS), "preset: wifi_5_indoor, rates: fixed, fixed_rate: 12 Mbit/s",
-     "preset: dot11p, rates: ideal", "preset: wifi_5_indoor, bandwidth: 10 MHz", "preset: lte, overhead: 40 B",
-     "preset: acoustic, duty_cycle: 1 %, rate: 1 kbit/s", "preset: lora_eu868, spreading_factor: 9, mtu: 115 B"],
-)  # fmt: skip
-def test_a_radio_is_asked_for_what_it_does(radio: str) -> None:
-    deployment_of(f"network.radios={{r: {{{radio}}}}}")
 
 
 def test_the_payloads_of_lora_are_as_long_as_its_spreading_factor_lets_them() -> None:
@@ -113,27 +104,8 @@ def test_a_rule_whose_packets_go_by_a_wire_has_a_rate() -> None:
 # --- who is on air is somewhere ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("sets", "problem"),
-    [
-        (("network.radios={r: {preset: wifi_5_indoor}}", "network.links=[{id: l, from: a, to: b, via: r}]"),
-         "network.links[0].via: goes by radio to or from a, which is nowhere: write network.places.a or its `on`, 'r'"),
-        (("network.radios={r: {preset: wifi_5_indoor}}", "network.links=[{id: l, from: a, to: b, via: r}]",
-          "network.robots={a: [r]}", "network.places={a: [0 m, 0 m, 1 m]}"), "network.places.b"),
-        (("network.defaults={preset: zigbee}",),
-         "network.defaults.preset: goes by radio to or from a, which is nowhere: write network.places.a"),
-    ],
-)  # fmt: skip
-def test_who_goes_by_radio_has_a_place(sets: tuple[str, ...], problem: str) -> None:
-    assert problem in refusal(*sets)
-    deployment_of(*sets, "network.places={'*': [0 m, 0 m, 1 m]}")
 
 
-def test_who_never_meets_a_radio_needs_no_place() -> None:
-    """A rule before takes all of its packets."""
-    before = "{id: wire, between: ['?', '*'], delay: 1 ms}, {id: seen, between: [camera, '*'], delay: 2 ms}"
-    behind = "{id: l, from: '*', to: '*', via: r}"
-    deployment_of("network.radios={r: {preset: wifi_5_indoor}}", f"network.links=[{before}, {behind}]")
 
 
 def test_the_links_of_the_console_are_ideal_and_need_no_radio_where_no_rule_names_it() -> None:

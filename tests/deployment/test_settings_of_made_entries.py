@@ -8,24 +8,12 @@ import pytest
 
 from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
-from tests.deployment.halls import hall, problems_of
-from tests.deployment.test_each import PILOT
-from tests.deployment.test_templates import ROVER
-
-TEXT = hall(
-    ROVER
-    + PILOT.replace("robots:", "hears: {'p*': [beacon, more]}, robots:")
-    + "  heavy: {like: rover, charge: 50 %}\n"
-    + "robots:\n  r: {like: rover, count: 9, x: -9 m, y: 2 m, spacing: {x: 2 m}}\n"
-    + "  red.one: {like: heavy, x: 0 m, y: 4 m}\n"
-    + "players: {p$1: {like: pilot, each: r-*}, q-$1: {like: pilot, each: red.*}}\n"
-    + "clients: {c$1: {each: r-*, on: $robot}}\n"
-)
+from tests.deployment.halls import MADE, problems_of
 
 
 def written(*sets: str) -> Any:
     """The canonical text after settings, as data."""
-    tree, _ = read_tree(apply_sets(TEXT, "f", sets), locate_in("f"))
+    tree, _ = read_tree(apply_sets(MADE, "f", sets), locate_in("f"))
     assert tree is not None
     return plain(tree)
 
@@ -39,7 +27,7 @@ def changed(*sets: str) -> dict[str, Any]:
         return {key: one for name, inner in value.items() for key, one in flat(inner, f"{path}/{name}").items()}
 
     def expanded(*of: str) -> dict[str, Any]:
-        tree, _ = read_tree(expanded_text(TEXT, "f", of), locate_in("f"))
+        tree, _ = read_tree(expanded_text(MADE, "f", of), locate_in("f"))
         assert tree is not None
         return flat(plain(tree), "")
 
@@ -76,44 +64,19 @@ def test_a_made_robot_is_written_as_an_entry_of_its_own() -> None:
     robots = written("robots.r-7.x=3 m", "robots.r-7.sensors.pose.rate=10 Hz")["robots"]
     assert robots["r-7"] == {"x": "3 m", "sensors": {"pose": {"rate": "10 Hz"}}}
     assert robots["r"]["count"] == 9
-    canonical = apply_sets(TEXT, "f", ["robots.r-7.x=3 m", "players.p7.rate=50 Hz"])
+    canonical = apply_sets(MADE, "f", ["robots.r-7.x=3 m", "players.p7.rate=50 Hz"])
     assert apply_sets(canonical, "c", []) == canonical
     players = load_deployment(canonical, "c").players
     assert [player.rate_hz for player in players.values()] == [10] * 6 + [50] + [10] * 3
 
 
 def test_a_setting_of_a_count_is_seen_by_the_next_one() -> None:
-    robots = load_deployment(apply_sets(TEXT, "f", ["robots.r.count=10", "robots.r-10.x=9.5 m"]), "f").robots
+    robots = load_deployment(apply_sets(MADE, "f", ["robots.r.count=10", "robots.r-10.x=9.5 m"]), "f").robots
     assert getattr(robots["r-10"], "x") == 9.5  # noqa: B009
 
 
-@pytest.mark.parametrize(
-    ("setting", "problem"),
-    [
-        ("robots.r-77.x=3 m", "--set:1:8: robots: unknown key, 'r-77', nearest is 'r-7'"),
-        ("robots.rr-7.x=3 m", "--set:1:8: robots: unknown key, 'rr-7', nearest is 'r-7'"),
-        ("robots.r-7.sensors.pos.rate=1 Hz", "--set:1:20: robots.r-7.sensors: unknown key, 'pos', nearest is 'pose'"),
-        ("robots.r-7.sensors.pose.rat=1 Hz",
-         "--set:1:25: robots.r-7.sensors.pose: unknown key, 'rat', nearest is 'rate'"),
-        ("robots.r-7.sensors.pose.rate=1 Hx",
-         "--set:1:30: robots.r-7.sensors.pose.rate: not a rate (a number and one of Hz, kHz, mHz), '1 Hx', "
-         "nearest is '1 Hz'"),
-        ("templates.rover.sensors.pose.rate=1 Hx",
-         "--set:1:35: templates.rover.sensors.pose.rate: not a rate (a number and one of Hz, kHz, mHz), '1 Hx', "
-         "nearest is '1 Hz'"),
-        ("robots.r-7.x.y=3 m", "--set:1:14: set inside a value that is no mapping, 'y'"),
-        ("players.p77.rate=1 Hz", "--set:1:9: players: unknown key, 'p77', nearest is 'p7'"),
-        ("players.p7.robots.r-7[4]=pose", "--set:1:22: no such entry, '4': the list has 0"),
-        ("robots.r-7.like=rovr", "--set:1:17: robots.r-7.like: unknown template, 'rovr', nearest is 'rover'"),
-        ("robots.r.count=x", "--set:1:16: robots.r.count: not a whole number from 1 to 4096, 'x'"),
-        ("nodes.one.robots=[r-1..8, rde.one]",
-         "--set:1:27: nodes.one.robots[1]: unknown robot, 'rde.one', nearest is 'red.one'"),
-    ],
-)  # fmt: skip
-def test_a_wrong_setting_knows_the_made_names(setting: str, problem: str) -> None:
-    assert problem in problems_of(TEXT, [setting])
 
 
 def test_a_robot_that_is_named_wrongly_is_compared_with_made_names() -> None:
-    text = TEXT.replace("on: $robot}}", "on: r-55}}").replace("c$1: {each: r-*, ", "c1: {")
+    text = MADE.replace("on: $robot}}", "on: r-55}}").replace("c$1: {each: r-*, ", "c1: {")
     assert problems_of(text) == ["13:20: clients.c1.on: unknown robot, 'r-55', nearest is 'r-5'"]

@@ -12,8 +12,7 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.layout import build_layout
 from foosim.world.models.rover import RoverRobot
-from tests.deployment.halls import PATROL, hall, problems_of
-from tests.deployment.test_templates import ROVER
+from tests.deployment.halls import PATROL, ROVER, hall
 from tests.kinematic_yard import yard_text
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
@@ -78,30 +77,6 @@ def test_nodes_and_players_have_the_spares_of_a_fleet() -> None:
     assert {player.on for player in deployment.players.values()} == {"r-1", "r-2"}
 
 
-@pytest.mark.parametrize(
-    ("robots", "problems"),
-    [
-        ("r: {like: rover, x: 1 m, y: 1 m, spare: 0}", ["8:43: robots.r.spare: not a whole number from 1 to 4096, 0"]),
-        ("r: {like: rover, x: 1 m, y: 1 m, spare: many}",
-         ["8:43: robots.r.spare: not a whole number from 1 to 4096, 'many'"]),
-        ("r: {like: rover, count: 2, spare: 4097, x: 1 m, y: 1 m}",
-         ["8:37: robots.r.spare: not a whole number from 1 to 4096, 4097"]),
-        ("r: {like: rover, count: 4000, spare: 97, x: 1 m, y: 1 m}",
-         ["8:27: robots.r.count: with it there are 4097 robots, more than 4096, 4097"]),
-        ("r: {like: rover, spare: 3, x: 1 m, y: 1 m}\n  r-2: {like: rover, spare: 2}",
-         ["9:22: robots.r-2: a spare of what the count of r makes, 'spare'"]),
-        ("r: {like: rover, spare: true, spacing: {x: 1 m}, x: 1 m, y: 1 m}",
-         ["8:33: robots.r: a spacing of what has no count, 'spacing'"]),
-        ("r: {like: rover, x: 1 m, y: 1 m}\n  base: {model: station, x: 9 m, y: 9 m, spare: true}",
-         ["9:49: robots.base.spare: a spare that could not be absent: a station without a place of its own, true"]),
-        ("r: {like: rover, x: 1 m, y: 1 m}\n  base: {model: station, x: 9 m, y: 9 m, spare: 2, spacing: {x: 1 m}}",
-         ["9:9: robots.base-1.spare: a spare that could not be absent: a station without a place of its own, true"]),
-    ],
-)  # fmt: skip
-def test_what_is_no_spare_is_said_where_it_is_written(robots: str, problems: list[str]) -> None:
-    assert problems_of(hall(f"{ROVER}robots:\n  {robots}\n")) == problems
-
-
 @pytest.mark.parametrize("fixed", [True, False])
 def test_what_is_fixed_is_no_spare(fixed: bool) -> None:
     """Whether it moves freely follows from its file: it is refused when that is there."""
@@ -118,14 +93,3 @@ def test_what_is_fixed_is_no_spare(fixed: bool) -> None:
     assert told.startswith(f"y:{line}:") and told.endswith(
         "robots.arm.spare: a spare that could not be absent: an urdf without a place of its own, true"
     )
-
-
-@pytest.mark.parametrize("count", ["-1", "64", "two", "true"])
-def test_spare_balls_of_a_table_are_few(count: str) -> None:
-    with pytest.raises(DeploymentError, match=r"table\.spare_balls: (not a whole number|.* that is valid, (0|63), )"):
-        apply_sets((DEPLOY / "table.yaml").read_text(), "table.yaml", [f"table.spare_balls={count}"])
-
-
-def test_a_name_of_a_spare_of_the_table_is_nobody_elses() -> None:
-    with pytest.raises(DeploymentError, match=r"robots\.ball-2: a reserved name|robots: a reserved name, 'ball-2'"):
-        apply_sets((DEPLOY / "table.yaml").read_text(), "table.yaml", ["robots.ball-2={model: camera, sensors: {}}"])

@@ -7,7 +7,6 @@ from contextlib import suppress
 from textwrap import dedent
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,16 +17,7 @@ from foosim.deployment.text.expand import expand
 from foosim.deployment.text.includes import Source
 from foosim.deployment.text.yaml import Fields, locate_in, plain, read_tree, write_yaml
 from foosim.world.models.rover import RoverRobot
-from tests.deployment.halls import BATTERY, HEAD, PATROL, POSE, WAREHOUSE, hall, long_robot, problems_of, same
-
-ROVER = f"""\
-templates:
-  rover:
-    model: rover
-    sensors:
-      pose: {POSE}
-      battery: {BATTERY}
-"""
+from tests.deployment.halls import BATTERY, HEAD, PATROL, ROVER, WAREHOUSE, hall, long_robot, problems_of, same
 
 
 def test_a_robot_has_the_keys_of_its_template_and_its_own_over_them() -> None:
@@ -94,81 +84,12 @@ def test_players_and_clients_may_be_like_templates() -> None:
 TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\n" for n in range(20))
 
 
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        (("rate: 5 Hz", "rate: 5 Hx"),
-         "5:32: templates.rover.sensors.pose.rate: not a rate (a number and one of Hz, kHz, mHz), '5 Hx', "
-         "nearest is '5 Hz'"),
-        (("rate: 5 Hz", "rate: 60 Hz"),
-         "5:32: templates.rover.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, '60 Hz', "
-         "nearest is '50 Hz'"),
-        (("5 Hz, offset", "5 Hz, ofset"),
-         "5:38: templates.rover.sensors.pose: unknown key, 'ofset', nearest is 'offset'"),
-        (("kind: pose, rate: 5 Hz, ", "kind: pose, "),
-         "5:13: templates.rover.sensors.pose: missing key, 'rate'"),
-        (("    model: rover", "    model: rovr"),
-         "3:12: templates.rover.model: unknown model (there are: camera, "
-         "differential_drive, holonomic, mover, quadrotor, rod, rotorcraft, rover, station, urdf, "
-          "or any module:Class), 'rovr', "
-          "nearest is 'rover'"),
-        (("    model: rover", "    model: rover\n    colour: red"),
-         "4:5: templates.rover: unknown key (there are: model, spare, tags, sensors, actuators, rules, x, y, heading, "
-         "charge), 'colour'"),
-        (("      pose:", "      echo:"),
-         "5:7: robots.r0.sensors: a reserved name, 'echo'"),
-        (("    model: rover", "    model: rover\n    heading: 400 deg"),
-         "4:14: templates.rover.heading: out of range -360 deg to 360 deg, '400 deg'"),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_with_a_template_is_said_there_once(change: tuple[str, str], problem: str) -> None:
-    text = ROVER.replace(*change)
-    assert problems_of(hall(text + TWENTY)) == [problem]
 
 
-def test_what_an_entry_has_beside_its_template_is_wrong_there() -> None:
-    fast = TWENTY.replace("r8: {like: rover, ", "r8: {like: rover, sensors: {pose: {rate: 60 Hz}}, ")
-    assert problems_of(hall(ROVER + fast)) == [
-        "16:44: robots.r8.sensors.pose.rate: above the rate of the ticks: valid are 1 mHz to 50 Hz, '60 Hz', "
-        "nearest is '50 Hz'",
-    ]
-    bad = TWENTY.replace("r7: {like: rover, x: -3 m", "r7: {like: rover, x: -3 mm/s")
-    bad = bad.replace("r8: {like: rover, x: -2 m, ", "r8: {like: rover, ")
-    assert problems_of(hall(ROVER + bad)) == [
-        "15:24: robots.r7.x: not a length (a number and one of m, cm, mm, um, km); mm/s measures a speed, '-3 mm/s'",
-        "16:7: robots.r8: missing key, 'x'",
-    ]
 
 
-@pytest.mark.parametrize(
-    ("rest", "problems"),
-    [
-        ("robots: {a: {like: rovr, x: 1 m, y: 1 m}}\n",
-         ["7:20: robots.a.like: unknown template, 'rovr', nearest is 'rover'"]),
-        ("robots: {a: {like: 7, x: 1 m, y: 1 m}}\n", ["7:20: robots.a.like: not the name of a template, 7"]),
-        ("robots: {a: {like: [rover], x: 1 m, y: 1 m}}\n",
-         ["7:20: robots.a.like: not the name of a template, a list of 1"]),
-        ("  a: {like: b}\n  b: {like: c}\n  c: {like: a}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
-         ["9:13: templates.c.like: a template that is like itself (a is like b is like c is like a), 'a'"]),
-        ("  a: {like: a}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
-         ["7:13: templates.a.like: a template that is like itself (a is like a), 'a'"]),
-        ("  a: 5\n  Big: {}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
-         ["7:6: templates.a: not a mapping, 5",
-          "8:3: templates: not a template's name (a name is a lower case letter, then lower case letters, digits, - "
-          "and _, at most 32 in all), 'Big'"]),
-        ("  a: {like: rover, count: 3, spacing: {x: 1 m}, each: '*'}\nrobots: {r: {like: a, x: 1 m, y: 1 m}}\n",
-         ["7:20: templates.a: a key of entries, which a template does not have, 'count'",
-          "7:30: templates.a: a key of entries, which a template does not have, 'spacing'",
-          "7:49: templates.a: a key of entries, which a template does not have, 'each'"]),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_like_something_is_refused_without_consequences(rest: str, problems: list[str]) -> None:
-    assert problems_of(hall(ROVER + rest)) == problems
 
 
-def test_templates_are_a_mapping() -> None:
-    bad = "templates: [a]\nrobots: {base: {model: station, x: 0 m, y: 0 m}}\n"
-    assert problems_of(hall(bad)) == ["1:12: templates: not a mapping, a list of 1"]
 
 
 def test_templates_that_are_like_one_another_end_somewhere() -> None:
@@ -182,37 +103,8 @@ def test_templates_that_are_like_one_another_end_somewhere() -> None:
     load_deployment(hall(ROVER + chain + robots.replace("t0", "t3")), "f")
 
 
-@pytest.mark.parametrize(
-    ("template", "problems"),
-    [
-        ("  other: {model: rover, charg: 1 %}\n", ["7:25: templates.other: unknown key, 'charg', nearest is 'charge'"]),
-        ("  other: {model: rower}\n",
-         ["7:18: templates.other.model: unknown model (there are: camera, "
-         "differential_drive, holonomic, mover, quadrotor, rod, rotorcraft, rover, station, urdf, "
-           "or any module:Class), 'rower', "
-           "nearest is 'rover'"]),
-        ("  other: {class: 'a.b:C', rate: 1 Hx}\n",
-         ["7:33: templates.other.rate: not a rate (a number and one of Hz, kHz, mHz), '1 Hx', nearest is '1 Hz'"]),
-        ("  other: {shape: box, length: 1 kg}\n",
-         ["7:31: templates.other.length: not a length (a number and one of m, cm, mm, um, km); "
-          "kg measures a mass, '1 kg'"]),
-        ("  other: {like: rovr}\n", ["7:17: templates.other.like: unknown template, 'rovr', nearest is 'rover'"]),
-        ("  other: {model: rover}\n  third: {x: 1 m}\n", []),
-    ],
-)  # fmt: skip
-def test_a_template_that_nobody_is_like_is_checked_as_far_as_it_goes(template: str, problems: list[str]) -> None:
-    text = hall(ROVER + template + "robots: {a: {like: rover, x: 1 m, y: 1 m}}\n")
-    if problems:
-        assert problems_of(text) == problems
-    else:
-        load_deployment(text, "f")
 
 
-def test_a_robot_in_a_shelf_is_named_whatever_it_is_like() -> None:
-    shelf = "scenery: {shelf: {shape: box, length: 2 m, width: 2 m, height: 2 m}}\n"
-    robots = "robots: {a: {like: rover, x: 5 m}, b: {like: rover, x: 0 m}}\n"
-    text = hall(ROVER + "    y: 0 m\n" + shelf + robots)
-    assert problems_of(text) == ["9:56: robots.b.x: the rover starts in scenery.shelf, '0 m, 0 m'"]
 
 
 # --- canonical text ---------------------------------------------------------------------------------------------------
