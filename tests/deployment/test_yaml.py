@@ -3,10 +3,10 @@
 from typing import Any
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.deployment.text import yaml as yaml_text
 from foosim.deployment.text.yaml import DEPTH_MAX, locate_in, measure, plain, read_tree, resolve, write_yaml
 
 
@@ -178,26 +178,16 @@ def test_what_is_written_reads_back(data: object) -> None:
     assert repr(back) == repr(data)
 
 
-USUAL = st.from_regex(yaml_text._USUAL, fullmatch=True) | st.from_regex(r"[a-z0-9.-]{1,9} ?[a-z]?", fullmatch=True)
-
-
-@given(
-    st.recursive(
-        st.none() | st.booleans() | NUMBERS | TEXTS | USUAL,
-        lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXTS | USUAL, inner, max_size=4),
-        max_leaves=12,
-    )
-)
-def test_it_is_written_as_pyyaml_writes_it(data: object) -> None:
-    """A large deployment is written without it, in a tenth of the time."""
-    assert write_yaml(data) == yaml_text._dump(data)
-
-
-def test_long_and_odd_keys_are_written_as_pyyaml_writes_them() -> None:
-    for key in ("k" * 99, "k" * 101, "k" * 200, "a b", "a: b", "\u00e9", "line\nline", "", " a", "-", "1", "null"):
+def test_long_and_odd_keys_read_back() -> None:
+    for key in ("k" * 101, "k" * 2000, "a b", "a: b", "\u00e9", "\u00a0", "line\nline", "", " a", "-", "1", "no", "a:"):
         data = {key: {key: [key, {key: key}, [[key], {}, []]]}}
-        assert write_yaml(data) == yaml_text._dump(data)
         assert read(write_yaml(data)) == data
+        assert yaml.safe_load(write_yaml(data)) == data
+
+
+@given(DATA)
+def test_what_is_written_is_the_same_in_yaml_1_1(data: object) -> None:
+    assert yaml.safe_load(write_yaml(data)) == data
 
 
 @given(st.text(max_size=80) | st.text("[]{}:,-?!&*#|>'\"%@`\n \t\\ab10.~=<", max_size=80))
