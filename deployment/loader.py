@@ -27,9 +27,9 @@ from foosim.deployment.network.rules import Network
 from foosim.deployment.overrides import place_sets
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import schema_findings
-from foosim.deployment.text.each import without_places_by_node
 from foosim.deployment.text.expand import Expanded, expand
 from foosim.deployment.text.includes import Source, read_source
+from foosim.deployment.text.made import without_places_by_node
 from foosim.deployment.text.places import Places
 from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.deployment.text.selection import TooManyComparisons

@@ -15,7 +15,7 @@ from typing import Any, Final
 from foosim.common.errors import describe
 from foosim.common.finding import Finding, Location, with_written
 from foosim.deployment.text.expand import ENTRIES
-from foosim.deployment.text.fleets import AXES, SPACING
+from foosim.deployment.text.made import AXES, SPACING
 from foosim.deployment.text.templates import TEMPLATES
 from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree, plain_shared
 

@@ -46,7 +46,7 @@ TOO_MANY = f"more than {COMPARISONS_MAX} comparisons of names with selectors"
 HOSTILE = {
     "a million": (ROVER + "robots: {r: {like: rover, count: 1000000}}\n", "not a whole number from 1 to 4096"),
     "count of count": (
-        ROVER + "robots: {r: {like: rover, count: 4}, r-1: {count: 4000}}\n", "a count of what the count of r makes"
+        ROVER + "robots: {r: {like: rover, count: 4}, r-1: {count: 4000}}\n", "a count of what the entry r makes"
     ),
     "a wide template": (f"templates: {{t: {{{WIDE}}}}}\nrobots: {{r: {{like: t, count: 4096}}}}\n", TOO_MUCH),
     "a wide template with more": (
