@@ -22,7 +22,6 @@ from foosim.world.assembly.world import build_scene
 from foosim.world.components.mounted import link_index
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
 from foosim.world.forms.settings import SensorSettings
 from foosim.world.forms.shown import LASER_SCAN, LOCATION_FIX, MESSAGES, POSE, POSE_IN_FRAME
 from foosim.world.layout import build_layout
@@ -110,7 +109,7 @@ def _shown(deployment: Deployment) -> dict[tuple[str, str], str]:
     found = {}
     for robot, its in sorted(deployment.robots.items()):
         for channel, settings in sorted(its.sensors.items()):
-            sensor = find_component("sensor", settings.kind)
+            sensor = settings.component_type
             if sensor.shown_as or not sensor.is_own:
                 found[robot, channel] = sensor.shown_as
     return found

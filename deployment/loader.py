@@ -65,10 +65,9 @@ SECTION_OF_KEY: Final = {"model": "robots", "shape": "scenery", "class": "player
 Text = str | Source
 """A deployment's text, alone or with the files that it includes."""
 
-_kept: dict[tuple[Text, str], Deployment] = {}
-"""By text and name, the least recently used first."""
-_trees: dict[tuple[Text, str], Tree] = {}
-"""Of canonical texts what they were made from, with its places in the files as written."""
+_kept: dict[tuple[Text, str], tuple[Deployment, Tree | None]] = {}
+"""By text and name, the least recently used first; of canonical texts with what they were made from, with its places in
+the files as written."""
 
 
 def load_deployment(text: Text, name: str) -> Deployment:
@@ -76,8 +75,8 @@ def load_deployment(text: Text, name: str) -> Deployment:
 
     Equal texts give one value, which nobody changes: all processes of a rehearsal load the same.
     """
-    known = _kept.pop((text, name), None)
-    return _keep(text, name, known or read_deployment(text, name))
+    known = _kept.pop((text, name), None) or (read_deployment(text, name), None)
+    return _keep(text, name, *known)
 
 
 def read_deployment(text: Text, name: str) -> Deployment:
@@ -85,11 +84,11 @@ def read_deployment(text: Text, name: str) -> Deployment:
     return _check(*read_source(text, name))
 
 
-def _keep(text: Text, name: str, deployment: Deployment) -> Deployment:
-    """Cache a text's deployment as the most recently used."""
+def _keep(text: Text, name: str, deployment: Deployment, tree: Tree | None) -> Deployment:
+    """Cache a text's deployment as the most recently used, with the tree that it was made from."""
     while len(_kept) >= DEPLOYMENTS_KEPT:
         _kept.pop(next(iter(_kept)))
-    _kept[text, name] = deployment
+    _kept[text, name] = deployment, tree
     return deployment
 
 
@@ -144,11 +143,7 @@ def _applied(
             problems.append(Problem(there.place, describe("missing key", "network")))
     tree, problems = _with_sets(tree, problems, sets)
     canonical = _canonical(tree)
-    _keep(canonical, name, _check(tree, problems))
-    while len(_trees) >= DEPLOYMENTS_KEPT:
-        _trees.pop(next(iter(_trees)))
-    if tree is not None:
-        _trees[canonical, name] = tree
+    _keep(canonical, name, _check(tree, problems), tree)
     return canonical
 
 
@@ -234,7 +229,7 @@ def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Se
     `text`, `name` and `sets` are what it was loaded from.
     """
     if findings:
-        tree = _trees.get((text, name)) if not sets else None
+        _, tree = (_kept.get((text, name)) if not sets else None) or (None, None)
         if tree is None:
             tree, _ = _with_sets(*read_source(text, name), sets)
         assert tree is not None, "it was loaded"

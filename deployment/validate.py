@@ -7,6 +7,7 @@ lines with places. The network's are in validate_network.py.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from itertools import chain
@@ -88,8 +89,7 @@ def _names(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     entities: dict[str, str] = {}
     endpoints: dict[str, str] = {}
     processes: dict[str, str] = {}
-    kits = deployment.kit_types.values()
-    reserved = (WORLD, *(name for kit in kits for name in (*kit.entities, *checked_spares(deployment, kit)[0])))
+    reserved = (WORLD, *_brought(deployment))
     for section, scopes, refused in (
         ("robots", (entities, endpoints), reserved),
         ("objects", (entities,), reserved),
@@ -204,7 +204,7 @@ def _hears(deployment: Deployment, ends: Names) -> Iterator[Finding]:
             location: Location = ("players", player, "hears", glob)
             matched = ends.matched(glob)
             if all(name == player for name in matched):
-                nearest = ends.nearest(glob, [name for name in ends.endpoints if name != player])
+                nearest = ends.nearest(glob, [name for name in ends.names if name != player])
                 yield Finding(location, "a selector that matches no other endpoint", nearest=nearest, at="key")
                 continue
             if glob not in said:
@@ -376,80 +376,67 @@ def _said(deployment: Deployment, ends: Names, hears: Mapping[str, Sequence[str]
 def _kits(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """Settings of a kit fit each other; what it brings into the world can be there, and has names of its own."""
     kits = deployment.kit_types
-    spares = {key: checked_spares(deployment, kit) for key, kit in kits.items()}
-    entities = {key: {**kit.entities, **spares[key][0]} for key, kit in kits.items()}
+    taken: dict[str, str] = {}
     for key, kit in kits.items():
-        check = getattr(kit.made, "check", None)
+        problems: list[str] = []
         try:
-            yield from [*check(deployment.kits[key], deployment)] if check is not None else []
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # SystemExit, too: a kit may do anything
-            if kit.is_own:
-                raise
-            yield Finding((key,), f"kit {key}: check fails: {failure_of(error, kit.module)}", at="key")
-        of_entities = kit_problems(key, entities, kits, (WORLD,))
-        for problem in (*spares[key][1], *of_entities, *_rules_of_kit(key, kit, kits)):
-            yield Finding((key,), f"kit {key}: {problem}", at="key")
+            yield from _called(kit, "check", _checked, kit, deployment)
+            spares = _spares(deployment, kit)
+        except BadValue as error:
+            problems, spares = [error.problem], {}
+        for name, model in {**kit.entities, **spares}.items():
+            problems += [f"its entity {name} {what}" for what in _not_there(model, kits)]
+            if name == WORLD:
+                problems.append(f"its entity {name} has a reserved name")
+            if taken.setdefault(f"entity {name}", key) != key:
+                problems.append(f"its entity {name} has a name that is also one of the kit {taken[f'entity {name}']}'s")
+        for label, data in kit.rules.items():
+            problems += [f"its rule {label}: {what}" for what in _wrong_rule(data, kits)]
+            if taken.setdefault(f"rule {label}", key) != key:
+                problems.append(f"its rule {label} has a name that is also one of the kit {taken[f'rule {label}']}'s")
+        yield from (Finding((key,), f"kit {key}: {problem}", at="key") for problem in problems)
     for label in deployment.rules:
-        others = [key for key, kit in kits.items() if label in kit.rules]
-        if others:
-            what = f"a rule that the kit {others[0]} has already: each world with a {others[0]} has it"
+        if f"rule {label}" in taken:
+            other = taken[f"rule {label}"]
+            what = f"a rule that the kit {other} has already: each world with a {other} has it"
             yield Finding(("rules", label), what, at="key")
 
 
-def _rules_of_kit(name: str, kit: Kit, kits: Mapping[str, Kit]) -> Iterator[str]:
-    """Yield what is wrong with the rules that a kit brings."""
-    for label, settings in kit.rules.items():
-        for other in kits:
-            if other < name and label in kits[other].rules:
-                yield f"its rule {label} has a name that is also one of the kit {other}'s"
-        try:
-            rule = registry.find("rule", settings["kind"])
-            rule.settings.model_validate(dict(settings))
-        except BadValue as error:
-            yield f"its rule {label}: {error}"
-        except ValidationError as error:
-            yield from (f"its rule {label}: {finding.text}" for finding in settings_findings(error, rule.settings, ()))
-        else:
-            assert isinstance(rule, WorldRule), rule
-            for problem in (*_needs_kit(rule, kits), *_rule_problems(rule)):
-                yield f"its rule {label}: {problem}"
+def _checked(kit: Kit, deployment: Deployment) -> list[Finding]:
+    """Return what a kit itself finds wrong with its section."""
+    check = getattr(kit.made, "check", None)
+    return [] if check is None else [*check(deployment.kits[kit.name], deployment)]
 
 
-def checked_spares(spec: Deployment, kit: Kit) -> tuple[Mapping[str, str], list[str]]:
-    """Return what a kit brings that is absent at the start, models by name, or why it cannot say so."""
+def _called(found: Form, what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return what a function of a component type returns. Raises BadValue, also where one of other packages fails."""
     try:
-        found: object = spares_of(spec, kit)
-    except KeyboardInterrupt:
+        return function(*arguments)
+    except (BadValue, KeyboardInterrupt):
         raise
-    except BaseException as error:  # SystemExit, too: a kit may do anything
-        if kit.is_own:
+    except BaseException as error:  # SystemExit, too: a function may do anything
+        if found.is_own:
             raise
-        return {}, [f"spares fails: {failure_of(error, kit.module)}"]
-    if not isinstance(found, Mapping) or not all(isinstance(text, str) for one in found.items() for text in one):
-        return {}, [f"spares returns a mapping of names to models, not {show(found)}"]
+        raise BadValue(f"{what} fails: {failure_of(error, found.module)}") from error
+
+
+def _spares(deployment: Deployment, kit: Kit) -> dict[str, str]:
+    """Return what a kit brings that is absent at the start, models by name. Raises BadValue."""
+    found: dict[str, str] = _called(kit, "spares", lambda: dict(spares_of(deployment, kit)))
     wrong = [name for name in found if not is_robot_name(name)]
     if wrong:
-        return {}, [f"spares returns the entity {show(wrong[0])}: {NAME_RULE}"]
-    return found, []
+        raise BadValue(f"spares returns the entity {show(wrong[0])}: {NAME_RULE}")
+    return found
 
 
-def kit_problems(
-    name: str, entities: Mapping[str, Mapping[str, str]], kits: Collection[str], reserved: Sequence[str]
-) -> Iterator[str]:
-    """Yield what a kit puts into a world with these kits that cannot be there.
-
-    `entities` are those of each kit, models by name, `reserved` names that no entity can have.
-    """
-    for entity, model in entities[name].items():
-        if entity in reserved:
-            yield f"its entity {entity} has a reserved name"
-        for other in kits:
-            if other < name and entity in entities[other]:
-                yield f"its entity {entity} has a name that is also one of the kit {other}'s"
-        for problem in _not_there(model, kits):
-            yield f"its entity {entity} is {problem}"
+def _brought(deployment: Deployment) -> dict[str, str]:
+    """Return what kits put into the world, models by name; without the spares of those whose spares are wrong."""
+    found: dict[str, str] = {}
+    for kit in deployment.kit_types.values():
+        found |= kit.entities
+        with suppress(BadValue):
+            found |= _spares(deployment, kit)
+    return found
 
 
 def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
@@ -457,13 +444,27 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
     try:
         model = registry.find_model(name)
     except BadValue as error:
-        yield f"of a model that is not there: {error}"
+        yield f"is of a model that is not there: {error}"
         return
     if model.is_robot:
-        yield f"of the model {model.name}, which is one of robots: these have owners, and are in robots:"
+        yield f"is of the model {model.name}, which is one of robots: these have owners, and are in robots:"
     for problem in _needs_kit(model, kits, model.name):
-        yield f"of a model that cannot be there: {problem}"
-    yield from _model_problems(model, kits, model.declared)
+        yield f"is of a model that cannot be there: {problem}"
+    yield from (f"is {problem}" for problem in _model_problems(model, kits, model.declared))
+
+
+def _wrong_rule(data: Mapping[str, Any], kits: Collection[str]) -> Iterator[str]:
+    """Yield what is wrong with a rule that a kit brings, as plain data."""
+    try:
+        rule = registry.find("rule", data["kind"])
+        rule.settings.model_validate(dict(data))
+    except BadValue as error:
+        yield str(error)
+    except ValidationError as error:
+        yield from (finding.text for finding in settings_findings(error, rule.settings, ()))
+    else:
+        assert isinstance(rule, WorldRule), rule
+        yield from (*_needs_kit(rule, kits), *_rule_problems(rule))
 
 
 def _scenery(deployment: Deployment, ends: Names) -> Iterator[Finding]:
@@ -487,12 +488,9 @@ def _scenery(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 def _models(deployment: Deployment) -> Iterator[Model]:
     """Yield the models of robots and objects, and of what kits put into the world."""
     yield from (one.component_type for one in (*deployment.robots.values(), *deployment.objects.values()))
-    for kit in deployment.kit_types.values():
-        for name in (*kit.entities.values(), *checked_spares(deployment, kit)[0].values()):
-            try:
-                yield registry.find_model(name)
-            except Refused:
-                continue  # reported with the kit
+    for name in _brought(deployment).values():
+        with suppress(Refused):  # reported with the kit
+            yield registry.find_model(name)
 
 
 def _radio(radio: RadioMaterial, location: Location) -> Iterator[Finding]:
@@ -681,7 +679,10 @@ def _unfit_component(
         period_ns = least_period_ns(deployment, component, settings)
     # Joints are as many as may be where that follows from a robot's file.
     counts = dict.fromkeys(JOINTS, JOINTS_MAX) if model.declared is None else model.declared
-    yield from _unknown_slots(settings, Carrier(0, period_ns, counts.get(JOINTS[0], 0)), location)
+    try:
+        component.slots_on(settings, Carrier(0, period_ns, counts.get(JOINTS[0], 0)))
+    except BadValue as error:
+        yield Finding(location, error.problem, _value_of(error, settings.kind), error.nearest)
     numbers = numbers_of(component, settings, counts)
     for number, modifier in enumerate(settings.modifiers):
         place: Location = (*location, "modifiers", number)
@@ -753,21 +754,8 @@ def _unfit_modifier(
     try:
         check = getattr(component.made, "check", None)
         if check is not None:
-            check(settings, numbers)
-    except BadValue as error:
-        yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # noqa: BLE001  # of whoever wrote the modifier
-        yield Finding(place, f"its check failed: {failure_of(error)}", settings.kind)
-    else:
-        yield from _unknown_slots(settings, carrier, place)
-
-
-def _unknown_slots(settings: ComponentSettings, carrier: Carrier, place: Location) -> Iterator[Finding]:
-    """Yield why the slots of a component do not follow from its settings and what it is on."""
-    try:
-        settings.component_type.slots_on(settings, carrier)
+            _called(component, "its check", check, settings, numbers)
+        component.slots_on(settings, carrier)
     except BadValue as error:
         yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)
 
@@ -981,7 +969,7 @@ STATE: Final = (
 WHOLE: Final = (
     Check("surfaces and gravity", lambda deployment, ends: findings_of(deployment)),
     Check("engine", _engine),
-    Check("settings of rules over radios", lambda d, ends: rule_findings(d.profiles(), ends.endpoints)),
+    Check("settings of rules over radios", lambda d, ends: rule_findings(d.profiles(), ends.names)),
     Check("places of endpoints on air", lambda deployment, ends: place_findings(deployment)),
 )
 FILES: Final = ((Check("walls of meshes", _open_meshes),), (Check("what models and components need", needs),))

@@ -41,7 +41,7 @@ from foosim.deployment.network.rules import ACTIONS, REST, Event, LinkRule, Netw
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import schema_findings
-from foosim.deployment.text.selection import TooManyComparisons
+from foosim.deployment.text.selection import Population
 
 JITTER_RATIO_MAX: Final = 100
 NEAREST_MAX: Final = 128
@@ -77,24 +77,16 @@ Kind = tuple[tuple[int, ...], tuple[str, ...], bool]
 whether it is the console."""
 
 
-class Names:
+class Names(Population):
     """The names of a deployment's endpoints, and the comparisons with them, which are bounded."""
 
     def __init__(self, endpoints: Sequence[str]) -> None:
-        self.endpoints = endpoints
-        self._matched: dict[str, list[str]] = {}
-        self._compared = self._nearest = 0
+        super().__init__(endpoints)
+        self._nearest = 0
 
     def matched(self, glob: str) -> Sequence[str]:
-        """The endpoints that a selector matches, with which it is compared once. Raises TooManyComparisons."""
-        found = self._matched.get(glob)
-        if found is None:
-            self._compared += len(self.endpoints)
-            if self._compared > limits.COMPARISONS_MAX:
-                raise TooManyComparisons
-            match = re.compile(translate(glob)).match
-            found = self._matched[glob] = [name for name in self.endpoints if match(name)]
-        return found
+        """The endpoints that a selector without ranges matches. Raises TooManyComparisons."""
+        return [] if ".." in glob else [name for name, _ in self.chosen(glob)]
 
     def nearest(self, value: str, choices: Iterable[str]) -> str | None:
         """The valid name most similar to a wrong one, in quotes."""
@@ -132,8 +124,8 @@ def _unmatched(
     ends: Names, glob: str, location: Location, beside: Sequence[str] = (), *, is_key: bool = False
 ) -> Iterator[Finding]:
     """A selector matches an endpoint, or is one of those beside."""
-    if ends.endpoints and glob not in beside and not ends.matched(glob):
-        nearest = ends.nearest(glob, [*ends.endpoints, *beside])
+    if ends.names and glob not in beside and not ends.matched(glob):
+        nearest = ends.nearest(glob, [*ends.names, *beside])
         what = "a selector that matches no endpoint"
         yield Finding(location, what, nearest=nearest, at="key" if is_key else "value")
 

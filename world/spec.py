@@ -14,7 +14,7 @@ from foosim.common.units import Quantity, period_ticks
 from foosim.world.earth import EarthOrigin
 from foosim.world.events import EVENTS_MAX, WorldEvent
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Engine, Kit
+from foosim.world.forms.forms import Engine, Kit, Model
 from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
 from foosim.world.matter.mesh import AssetError, Mesh, check_digest
 from foosim.world.matter.physics import PhysicsSettings, SurfaceSettings
@@ -88,7 +88,9 @@ def schedule_of(timed: Timed, tick_ns: int) -> Schedule:
 
 def default_engine(world: Mapping[str, Any]) -> str:
     """Return the engine of a world (its sections by their fields) that names none."""
-    models = [registry.find_model(name) for kit in _kits(world.get(KITS, {})) for name in kit.entities.values()]
+    models: list[Model | None] = [
+        registry.find_model(name) for kit in _kits(world.get(KITS, {})) for name in kit.entities.values()
+    ]
     models += [one.component_type for section in ("robots", "objects") for one in world.get(section, {}).values()]
     return "bullet" if any(model is not None and model.shares_solve for model in models) else "mujoco"
 

@@ -234,7 +234,8 @@ KITS: Final = {
                                                 "own"],
     "spares=lambda section: {'ball-2': 'ball'}": ["its entity ball-2 has a name that is also one of the kit table's"],
     "spares=lambda section: {'Leo': 'ball'}": [f"spares returns the entity 'Leo': {NAME_RULE}"],
-    "spares=lambda section: ['ball']": ["spares returns a mapping of names to models, not a list of 1"],
+    "spares=lambda section: ['ball']": ["spares fails: ValueError: dictionary update sequence element #0 has length "
+                                      "4; 2 is required"],
     "spares=lambda section: 1 // 0": ["spares fails: ZeroDivisionError: integer division or modulo by zero "
                                       "(own_form.py:72)"],
 }  # fmt: skip

@@ -203,10 +203,7 @@ def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
     about = "slots={'x': 1}, variants={'rigid': {'is_rigid': True, 'slots': {'y': 2}}}"
     written(site, *settings, f"model('own', Moved, {about})(Own)")
     model = find_model("own_form:Own")
-    asked: list[Any] = [
-        model.settings.model_validate({"model": "own_form:Own", "dynamics": its}) for its in ("none", "rigid")
-    ]
-    plain, rigid = (registry.model_of(its) for its in asked)
+    plain, rigid = (model.variant(its) for its in ("none", "rigid"))
     assert plain is model and (rigid.name, rigid.is_rigid) == ("own", True)
     assert [*plain.fields_of(None, None)] == ["x", "down", "refused", "clamped"]
     assert [*rigid.fields_of(None, None)] == ["y", "down", "refused", "clamped", "quarantined"]
