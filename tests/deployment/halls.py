@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from foosim.common.errors import DeploymentError
-from foosim.deployment.loader import Text, apply_sets, load_deployment
+from foosim.deployment.loader import Text, apply_sets
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 
 WAREHOUSE = Path(__file__).parents[2] / "deploy" / "warehouse.yaml"
@@ -68,19 +68,8 @@ MADE = hall(
 """A fleet with players and clients, and a robot beside it."""
 
 
-def long_robot(x: str, y: str, **more: object) -> dict[str, object]:
-    """Return a rover that is written out, with a pose and a battery."""
-    sensors = {
-        "pose": {"kind": "pose", "rate": "5 Hz", "offset": "0 s"},
-        "battery": {"kind": "battery", "rate": "1 Hz", "offset": "0 s"},
-    }
-    return {"model": "rover", "x": x, "y": y, "sensors": sensors, **more}
 
 
-def same(short: str, robots: dict[str, object], **sections: object) -> None:
-    """Assert that a hall is the same as one whose robots and other sections are written out."""
-    written = "".join(f"{name}: {json.dumps(value)}\n" for name, value in {"robots": robots, **sections}.items())
-    assert load_deployment(hall(short), "short").model_dump() == load_deployment(hall(written), "long").model_dump()
 
 
 def problems_of(text: Text, sets: Sequence[str] = (), name: str = "f") -> list[str]:

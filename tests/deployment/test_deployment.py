@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from foosim.common.units import Pace
 from foosim.deployment.components import read_components
 from foosim.deployment.json_schema import deployment_schema_text
-from foosim.deployment.loader import DEPLOYMENT_KEYS, apply_sets, load_deployment
+from foosim.deployment.loader import DEPLOYMENT_KEYS, apply_sets, expanded_text, load_deployment, read_deployment
 from foosim.deployment.network.impairments import GammaJitter
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
@@ -22,7 +22,7 @@ from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.launcher.children.restarts import WAITS_S
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.world.forms.per_field import numbers_of, read_per_field
-from foosim.world.forms.registry import find_component
+from foosim.world.forms.registry import find, find_component, find_model
 from foosim.world.models.camera import CameraRobot
 from foosim.world.models.rod import RodRobot
 from foosim.world.modifiers.gaussian_noise import GaussianNoiseSettings
@@ -153,11 +153,45 @@ def test_a_rule_without_effects_is_a_perfect_link() -> None:
     assert (rule.delay_ns, rule.jitter, rule.loss, rule.order) == (0, None, 0.0, "fifo")
 
 
-def test_a_deployment_written_in_si_units_is_the_same_deployment(table: Deployment) -> None:
-    written = table.model_dump(mode="json", by_alias=True)
+
+
+DEPLOYMENTS = ("table.yaml", "table_sensors.yaml", "warehouse.yaml", "yard.yaml")
+
+
+@pytest.mark.parametrize("name", DEPLOYMENTS)
+@pytest.mark.parametrize("sets", [(), ("seed=5", "network.defaults={in_flight_on_partition: deliver}", "pace=fast")])
+def test_all_texts_of_a_deployment_are_the_same_deployment(name: str, sets: tuple[str, ...]) -> None:
+    """The canonical one, which keeps what is abbreviated, the expanded one, and that in SI units."""
+    text = (DEPLOY / name).read_text()
+    canonical, expanded = apply_sets(text, name, sets), expanded_text(text, name, sets)
+    assert apply_sets(canonical, "c", []) == canonical and "#" not in canonical
+    assert canonical.count("like:") == sum("like:" in line.partition("#")[0] for line in text.splitlines())
+    assert not any(sign in expanded for sign in ("templates", "like", "$", "count:"))
+    kept = load_deployment(canonical, name)
+    assert kept is load_deployment(canonical, name)
+    written = kept.model_dump(mode="json", by_alias=True, exclude_unset=True)
     data, findings = read_components(written | written.pop("kits"), DEPLOYMENT_KEYS)
     assert findings == []
-    assert Deployment.model_validate(data) == table
+    for other in (read_deployment(canonical, name), load_deployment(expanded, "e")):
+        assert kept == other and repr(kept) == repr(other)
+    assert Deployment.model_validate(data).model_dump() == kept.model_dump()
+    assert load_deployment(text, name).seed == 1, "settings change no other text"
+
+
+@pytest.mark.parametrize("name", DEPLOYMENTS)
+def test_settings_know_their_component_type_and_so_do_copies(name: str) -> None:
+    loaded = load_deployment((DEPLOY / name).read_text(), name)
+    for one in (loaded, loaded.model_copy(update={"seed": 9})):
+        assert one.engine_type is find("engine", one.engine) and [*one.kit_types] == sorted(one.kits)
+        typed = [("rule", rule) for rule in one.world_rules.values()]
+        for robot in one.robots.values():
+            model = find_model(robot.model).variant(getattr(robot, "dynamics", None))
+            assert robot.model_copy(update={"spare": True}).component_type is robot.component_type is model
+            typed += [("entity_rule", rule) for rule in robot.rules.values()]
+            for form, components in (("sensor", robot.sensors), ("actuator", robot.actuators)):
+                typed += [(form, its) for its in components.values()]
+                typed += [("modifier", modifier) for its in components.values() for modifier in its.modifiers]
+        assert typed and all(its.component_type is find(form, its.kind) for form, its in typed)
 
 
 def test_values_do_not_change(table: Deployment) -> None:

@@ -126,6 +126,7 @@ class Case:
     replaced: list[tuple[int, str]]
     added: str
     problems: list[str]
+    written_out: str
 
     @property
     def found(self) -> list[str]:
@@ -153,7 +154,7 @@ def cases() -> Iterator[Case]:
     """The cases of deployment_problems.txt."""
     for block in CASES.read_text().partition("\n\n")[2].strip("\n").split("\n\n"):
         lines = block.split("\n")
-        marks = ("> ", "+ ", "--set ", "@")
+        marks = ("> ", "+ ", "= ", "--set ", "@")
         marked = {mark: [line[len(mark) :] for line in lines if line.startswith(mark)] for mark in marks}
         replaced: dict[int, list[str]] = {}
         for match in filter(None, (re.fullmatch(r"([0-9]+)\|(?: (.*))?", line) for line in lines)):
@@ -161,12 +162,16 @@ def cases() -> Iterator[Case]:
         base = marked["@"][0] if marked["@"] else "small"
         assert len(lines) == sum(map(len, (*marked.values(), *replaced.values()))), block
         others = [(number, "\n".join(texts)) for number, texts in replaced.items()]
-        yield Case(base, marked["--set "], others, "".join(f"{line}\n" for line in marked["+ "]), marked["> "])
+        added, out = ("".join(f"{line}\n" for line in marked[mark]) for mark in ("+ ", "= "))
+        yield Case(base, marked["--set "], others, added, marked["> "], out)
 
 
 @pytest.mark.parametrize("case", list(cases()), ids=lambda case: (case.sets or [case.added or case.base])[0][:60])
 def test_each_problem_is_one_line_with_its_place(case: Case) -> None:
     assert case.found == case.problems
+    if case.written_out:
+        short, long = hall(HALLS[case.base] + case.added), hall(case.written_out)
+        assert load_deployment(short, "short").model_dump() == load_deployment(long, "long").model_dump()
 
 
 def test_all_problems_of_fields_come_at_once_in_the_files_order_then_all_between_them() -> None:

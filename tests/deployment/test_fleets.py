@@ -17,37 +17,8 @@ from foosim.common.errors import BadValue
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.text.selection import Population, Selector, TooManyComparisons
 from foosim.world.models.rover import RoverRobot
-from tests.deployment.halls import FLEET, PATROL, ROVER, hall, long_robot, same
+from tests.deployment.halls import FLEET, ROVER, hall
 from tests.kinematic_yard import yard_text
-
-PILOTS = f"  pilot: {{class: '{PATROL}', rate: 10 Hz, on: $robot, robots: {{$robot: [pose]}}}}\n"
-
-
-def test_a_count_makes_robots_each_further_by_the_spacing() -> None:
-    same(
-        ROVER + "robots: {r: {like: rover, count: 3, x: -1.5 m, y: 2 m, spacing: {x: 125 cm, y: -0.1 m}}}\n",
-        {
-            "r-1": long_robot("-1.5 m", "2 m"),
-            "r-2": long_robot("-0.25 m", "1.9 m"),
-            "r-3": long_robot("1 m", "1.8 m"),
-        },
-    )
-
-
-def test_an_entry_of_its_name_holds_what_is_different_about_one() -> None:
-    same(
-        ROVER
-        + "  bare: {model: rover, charge: 9 %, sensors: {}}\n"
-        + "robots:\n  r-3: {like: bare}\n"
-        + "  r: {like: rover, count: 3, x: 1 m, y: 2 m, spacing: {x: 1 m}}\n"
-        + "  r-2: {y: 5 m, x: 7 m, charge: 50 %}\n  r-4: {like: rover, x: 9 m, y: 9 m}\n",
-        {
-            "r-1": long_robot("1 m", "2 m"),
-            "r-2": long_robot("7 m", "5 m", charge="50 %"),
-            "r-3": long_robot("3 m", "2 m", charge="9 %", sensors={}),
-            "r-4": long_robot("9 m", "9 m"),
-        },
-    )
 
 
 @pytest.mark.parametrize("at", [None, {}, {"yaw": "90 deg"}])
@@ -60,21 +31,6 @@ def test_what_stands_at_a_pose_is_spaced_from_the_origin_where_none_is_given(at:
     assert places == [(0.0, 0.0), (2.0, -0.5), (7.0, -1.0)]
 
 
-def test_scenery_has_counts_too_and_starts_at_its_default_place() -> None:
-    pillar = {"shape": "cylinder", "radius": "20 cm", "length": "5 m", "radio": "concrete", "y": "-9 m"}
-    short = (
-        "scenery:\n  p: {shape: cylinder, count: 3, spacing: {x: 5 m, z: 10 mm}, radius: 20 cm, length: 5 m, "
-        + "radio: concrete, y: -9 m}\n"
-    )
-    same(
-        ROVER + "robots: {r: {like: rover, x: 1 m, y: 2 m}}\n" + short,
-        {"r": long_robot("1 m", "2 m")},
-        scenery={
-            "p-1": pillar,
-            "p-2": {**pillar, "x": "5 m", "z": "10 mm"},
-            "p-3": {**pillar, "x": "10 m", "z": "0.02 m"},
-        },
-    )
 
 
 def lengths(digits_max: int) -> st.SearchStrategy[str]:

@@ -6,7 +6,7 @@ import pytest
 
 from foosim.common import limits
 from foosim.common.errors import DeploymentError
-from foosim.deployment.loader import apply_sets, load_deployment, read_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.models.rod import RodRobot
 
@@ -25,12 +25,6 @@ def refused(*sets: str) -> list[str]:
     return list(error.value.problems)
 
 
-def test_without_settings_the_canonical_text_is_the_same_deployment_and_its_own_canonical_text() -> None:
-    canonical = apply_sets(TABLE_TEXT, "table.yaml", [])
-    assert load_deployment(canonical, "canonical") == load_deployment(TABLE_TEXT, "table.yaml")
-    assert apply_sets(canonical, "canonical", []) == canonical
-    assert "tick: 2 ms\n" in canonical
-    assert "#" not in canonical
 
 
 def test_settings_reach_scalars_lists_and_names_with_dots() -> None:
@@ -123,20 +117,6 @@ def test_settings_do_not_lift_the_limits_of_a_file() -> None:
     assert len(apply_sets(TABLE_TEXT, "f", pages[:5]).encode()) < limits.DEPLOYMENT_BYTES_MAX
 
 
-@pytest.mark.parametrize(
-    "sets",
-    [
-        (),
-        ("seed=5", "tick=1e-3 s", "robots.red.goal.sensors.encoder.rate=50 Hz"),
-        ("table.rules.kickoff_delay=1e2 ms", "players={}", "network.links=[]", "clients={ear: {}, 'null': {}}"),
-        ("players.player-red.parameters={a: 1e3, b: '1e3', c: ~, d: \"\\a \\u2028\", e: -0.0, f: [yes, 'true']}",),
-    ],
-)
-def test_what_is_kept_of_a_changed_text_is_what_it_reads_as(sets: tuple[str, ...]) -> None:
-    canonical = apply_sets(TABLE_TEXT, "kept.yaml", sets)
-    kept, read = load_deployment(canonical, "kept.yaml"), read_deployment(canonical, "kept.yaml")
-    assert kept is load_deployment(canonical, "kept.yaml") and kept is not read
-    assert kept == read and repr(kept) == repr(read)
 
 
 def test_settings_change_no_other_text() -> None:

@@ -12,38 +12,12 @@ from hypothesis import strategies as st
 
 from foosim.common import limits
 from foosim.common.errors import DeploymentError
-from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
+from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.expand import expand
 from foosim.deployment.text.includes import Source
 from foosim.deployment.text.yaml import Fields, locate_in, plain, read_tree, write_yaml
 from foosim.world.models.rover import RoverRobot
-from tests.deployment.halls import BATTERY, HEAD, PATROL, ROVER, WAREHOUSE, hall, long_robot, problems_of, same
-
-
-def test_a_robot_has_the_keys_of_its_template_and_its_own_over_them() -> None:
-    same(
-        ROVER + "robots: {a: {like: rover, x: 1 m, y: 2 m}, b: {like: rover, x: 3 m, y: 2 m, charge: 50 %}}\n",
-        {"a": long_robot("1 m", "2 m"), "b": long_robot("3 m", "2 m", charge="50 %")},
-    )
-
-
-def test_mappings_are_merged_key_by_key_and_all_else_replaces() -> None:
-    with_scenery = ROVER + "  shelf: {shape: box, length: 1 m, width: 1 m, height: 1 m, radio: {loss: 12 dB}}\n"
-    own = "robots: {a: {like: rover, x: 1 m, y: 2 m, sensors: {pose: {rate: 10 Hz}}}}\n"
-    robot: Any = long_robot("1 m", "2 m")
-    robot["sensors"]["pose"]["rate"] = "10 Hz"
-    box = {"shape": "box", "length": "1 m", "width": "1 m", "height": "1 m"}
-    things = {"s": {**box, "y": "9 m", "radio": "wood"}, "t": {**box, "y": "7 m", "radio": {"loss": "3 dB"}}}
-    scenery = "scenery: {s: {like: shelf, y: 9 m, radio: wood}, t: {like: shelf, y: 7 m, radio: {loss: 3 dB}}}\n"
-    same(with_scenery + own + scenery, {"a": robot}, scenery=things)
-
-
-def test_null_takes_away_what_the_template_has() -> None:
-    robot: Any = long_robot("1 m", "2 m")
-    del robot["sensors"]["battery"]
-    same(ROVER + "robots: {a: {like: rover, x: 1 m, y: 2 m, sensors: {battery: null}}}\n", {"a": robot})
-    null = "robots: {a: {like: rover, x: 1 m, y: 2 m, sensors: {other: null}}}\n"
-    assert problems_of(hall(ROVER + null)) == ["7:60: robots.a.sensors.other: not a mapping, null"]
+from tests.deployment.halls import BATTERY, HEAD, ROVER, WAREHOUSE, hall, problems_of
 
 
 def test_a_setting_of_null_takes_away_what_a_template_has_itself_or_by_another_one() -> None:
@@ -55,28 +29,8 @@ def test_a_setting_of_null_takes_away_what_a_template_has_itself_or_by_another_o
             assert [*load_deployment(changed, "f.yaml").robots["a"].sensors] == ["pose"]
 
 
-def test_a_template_may_be_like_another_one() -> None:
-    heavy = "  heavy: {like: rover, charge: 40 %, sensors: {battery: {offset: 20 ms}}}\n  slow: {like: heavy, y: 2 m}\n"
-    robot: Any = long_robot("1 m", "2 m", charge="40 %")
-    robot["sensors"]["battery"]["offset"] = "20 ms"
-    same(ROVER + heavy + "robots: {a: {like: slow, x: 1 m}}\n", {"a": robot})
 
 
-def test_players_and_clients_may_be_like_templates() -> None:
-    short = (
-        ROVER
-        + f"  driver: {{class: '{PATROL}', rate: 10 Hz, hears: {{a: [pose]}}, parameters: {{rover: a}}}}\n"
-        + "  ear: {lockstep: true, rate: 5 Hz}\n"
-        + "robots: {a: {like: rover, x: 1 m, y: 2 m}}\n"
-        + "players: {p: {like: driver, on: a, robots: {a: [battery]}}}\nclients: {c: {like: ear, rate: 10 Hz}}\n"
-    )
-    player = {"class": PATROL, "rate": "10 Hz", "hears": {"a": ["pose"]}, "parameters": {"rover": "a"}}
-    same(
-        short,
-        {"a": long_robot("1 m", "2 m")},
-        players={"p": {**player, "on": "a", "robots": {"a": ["battery"]}}},
-        clients={"c": {"lockstep": True, "rate": "10 Hz"}},
-    )
 
 
 # --- what is wrong ----------------------------------------------------------------------------------------------------
@@ -110,18 +64,8 @@ def test_templates_that_are_like_one_another_end_somewhere() -> None:
 # --- canonical text ---------------------------------------------------------------------------------------------------
 
 
-def test_the_canonical_text_has_its_templates_and_is_its_own() -> None:
-    text = hall(ROVER + TWENTY)
-    canonical = apply_sets(text, "f", [])
-    assert canonical.count("kind: pose") == 1
-    assert apply_sets(canonical, "c", []) == canonical
-    assert load_deployment(canonical, "c") == load_deployment(text, "f")
 
 
-def test_the_expanded_text_has_none_and_is_the_same_deployment() -> None:
-    expanded = expanded_text(WAREHOUSE.read_text(), "w")
-    assert "templates" not in expanded and "like" not in expanded and "$" not in expanded
-    assert load_deployment(expanded, "e") == load_deployment(WAREHOUSE.read_text(), "w")
 
 
 def test_the_warehouse_is_what_it_would_be_written_out() -> None:
