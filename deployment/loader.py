@@ -45,7 +45,6 @@ from foosim.deployment.text.yaml import (
     Tree,
     measure,
     plain,
-    plain_shared,
     write_yaml,
 )
 from foosim.deployment.validate import needs, stages
@@ -261,7 +260,7 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     """The deployment that a tree is, and the problems of what is in it: those of fields by themselves, else between
     fields, else of the world that they make. Raises TooManyComparisons."""
     assert expanded.tree is not None, "it can be examined"
-    data = plain_shared(expanded.tree)
+    data = plain(expanded.tree)
 
     def first(*findings: Iterable[Finding]) -> list[Finding]:
         return list(islice(places.distinct(chain(*findings), expanded.broken), PROBLEMS_MAX + 1))

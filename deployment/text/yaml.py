@@ -252,16 +252,7 @@ def _integer(text: str) -> int:
 
 
 def plain(tree: Tree) -> Any:
-    """Return the tree as new dicts, lists and scalars."""
-    if isinstance(tree, Leaf):
-        return tree.value
-    if isinstance(tree, Items):
-        return [plain(item) for item in tree.items]
-    return {key: plain(value) for key, value in tree.values.items()}
-
-
-def plain_shared(tree: Tree) -> Any:
-    """Return the tree as dicts, lists and scalars, of which nobody changes any: a node that is met again is one value.
+    """Return the tree as new dicts, lists and scalars; a node that is met again is one value.
 
     The entries of an expanded tree share what they have from a template.
     """

@@ -167,7 +167,7 @@ def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
     (problem,) = problems("robots.red.goal.sensors.encoder.modifiers=[{kind: 'own_form:Own'}]")
     line = len((site / "own_form.py").read_text().splitlines()) - 1
     why = f"ZeroDivisionError: integer division or modulo by zero (own_form.py:{line})"
-    assert problem.endswith(f"modifiers[0]: its check failed: {why}, 'own_form:Own'")
+    assert problem.endswith(f"modifiers[0]: its check fails: {why}, 'own_form:Own'")
 
 
 @pytest.mark.parametrize(("bound", "said"), [("gt=0", "not above 0, 0"), ("lt=0", "not below 0, 0"),
