@@ -30,6 +30,7 @@ from foosim.world.parameters.table import LINE_NAMES, TEAMS, table_of
 from foosim.world.sensors.ball import BallSettings
 from foosim.world.sensors.encoder import EncoderSettings
 from tests.deployment.halls import BATTERY, PATROL, POSE, hall
+from tests.turns import BY_PERIOD
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
@@ -309,3 +310,18 @@ def test_a_lost_supervisor_or_vhub_is_waited_for_as_long_as_a_start_takes(start_
     assert min(deadlines.orphan_ns, deadlines.vhub_back_ns, UNKNOWN_NS if start_s <= 60 else longest_ns) >= longest_ns
     given = load_deployment(apply_sets(TABLE_TEXT, "f", [*sets, "deadlines.orphan=5 s"]), "f").deadlines
     assert given.orphan_ns == 5 * 10**9 and given.vhub_back_ns == deadlines.vhub_back_ns
+
+
+def test_who_is_on_board_is_kept_and_clients_too() -> None:
+    sets = ("players.player-red.on=red.goal", "clients={laptop: {on: camera}}")
+    deployment = load_deployment(apply_sets(TABLE_TEXT, "table.yaml", sets), "table.yaml")
+    assert (deployment.players["player-red"].on, deployment.clients["laptop"].on) == ("red.goal", "camera")
+    assert deployment.players["player-blue"].on is None
+
+
+def test_a_selector_over_robots_takes_those_that_have_the_channel() -> None:
+    sets = (*BY_PERIOD, "players.player-red.hears={'*': [encoder, beacon]}", "players.player-red.robots={}")
+    deployment = load_deployment(apply_sets(TABLE_TEXT, "table.yaml", sets), "table.yaml")
+    heard = deployment.heard_by("player-red")
+    assert ("camera", "encoder") not in heard and ("red.goal", "encoder") in heard
+    assert [pair for pair in heard if pair[1] == "beacon"] == [("player-blue", "beacon")]
