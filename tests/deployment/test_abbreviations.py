@@ -25,7 +25,7 @@ from foosim.deployment.text.selection import Population, Selector, TooManyCompar
 from foosim.deployment.text.yaml import Fields, locate_in, plain, read_tree, write_yaml
 from foosim.world.layout import build_layout
 from foosim.world.models.rover import RoverRobot
-from tests.deployment.halls import BATTERY, FLEET, HEAD, MADE, PATROL, PILOT, ROVER, TWO, WAREHOUSE, hall, problems_of
+from tests.deployment.halls import BATTERY, HEAD, MADE, PATROL, PILOT, ROVER, TWO, WAREHOUSE, hall, problems_of
 from tests.kinematic_yard import yard_text
 
 # --- templates --------------------------------------------------------------------------------------------------------
@@ -41,8 +41,6 @@ def test_a_setting_of_null_takes_away_what_a_template_has_itself_or_by_another_o
 
 
 # --- what is wrong ----------------------------------------------------------------------------------------------------
-
-TWENTY = "robots:\n" + "".join(f"  r{n}: {{like: rover, x: {n - 10} m, y: 2 m}}\n" for n in range(20))
 
 
 def test_templates_that_are_like_one_another_end_somewhere() -> None:
@@ -268,73 +266,11 @@ def test_comparisons_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
         population.chosen("*10")
 
 
-def owners(nodes: str, robots: str = FLEET) -> dict[str, str]:
-    """The node of each robot of the fleet, by the number of the robot."""
-    return load_deployment(hall(robots + nodes), "f").owners()
-
-
-@pytest.mark.parametrize(
-    "nodes",
-    [
-        "{west: {robots: [rover-1..6]}, east: {robots: [rest]}}",
-        "{west: {robots: [rest]}, east: {robots: [rover-7, rover-8..9, 'rover-1?']}}",
-        "{west: {robots: [rover-1, rover-1..6, rover-2..4]}, east: {robots: [rest]}}",
-        "{west: {robots: [rover-6..6, rover-1..5]}, east: {robots: ['rover-1?', rover-7..9]}}",
-    ],
-)
-def test_nodes_select_robots(nodes: str) -> None:
-    found = owners(f"nodes: {nodes}\n")
-    assert found == {f"rover-{n}": "west" if n <= 6 else "east" for n in range(1, 13)}
-
-
-def test_a_robot_called_rest_is_that_robot() -> None:
-    robots = ROVER + "robots: {rest: {like: rover, x: 1 m, y: 1 m}, b: {like: rover, x: 3 m, y: 1 m}}\n"
-    assert owners("nodes: {one: {robots: [rest]}, two: {robots: [b]}}\n", robots) == {"rest": "one", "b": "two"}
-
-
 # --- spares -----------------------------------------------------------------------------------------------------------
 
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
-FLEET: Final = "{like: rover, x: -15 m, y: 10 m, spacing: {x: 2 m}"
 BOX: Final = {"model": "box", "size": ["20 cm"] * 3, "mass": "1 kg", "at": {"z": "10 cm"}}
-
-
-def rovers(entries: str) -> dict[str, tuple[float, bool]]:
-    """Return where along x the rovers of a small hall start, and whether each is a spare."""
-    found = {}
-    for name, robot in load_deployment(hall(f"{ROVER}robots:\n  {entries}\n"), "hall").robots.items():
-        assert isinstance(robot, RoverRobot)
-        found[name] = robot.x, robot.spare
-    return found
-
-
-def test_a_fleet_has_spares_behind_its_count() -> None:
-    present, spares = {"r-1": (-15.0, False), "r-2": (-13.0, False)}, {"r-3": (-11.0, True), "r-4": (-9.0, True)}
-    assert rovers(f"r: {FLEET}, count: 2, spare: 2}}") == {**present, **spares}
-
-
-def test_a_fleet_may_be_of_spares_alone() -> None:
-    assert rovers(f"r: {FLEET}, spare: 2}}") == {"r-1": (-15.0, True), "r-2": (-13.0, True)}
-
-
-def test_one_may_be_a_spare_and_so_may_a_whole_fleet() -> None:
-    alone = "one: {like: rover, x: 1 m, y: 1 m, spare: true}"
-    assert rovers(f"{alone}\n  two: {{like: rover, x: 3 m, y: 1 m, spare: false}}") == {
-        "one": (1.0, True),
-        "two": (3.0, False),
-    }
-    assert rovers(f"r: {FLEET}, count: 2, spare: true}}") == {"r-1": (-15.0, True), "r-2": (-13.0, True)}
-
-
-def test_what_is_written_of_one_of_a_fleet_counts() -> None:
-    own = "r-1: {spare: true}\n  r-3: {x: 7 m}\n  r-4: {spare: false}"
-    assert rovers(f"r: {FLEET}, count: 2, spare: 2}}\n  {own}") == {
-        "r-1": (-15.0, True),
-        "r-2": (-13.0, False),
-        "r-3": (7.0, True),
-        "r-4": (-9.0, False),
-    }
 
 
 def test_objects_have_spares_too_and_a_set_changes_how_many() -> None:
