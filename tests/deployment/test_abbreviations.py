@@ -287,7 +287,8 @@ def test_nodes_and_players_have_the_spares_of_a_fleet() -> None:
         f"players:\n  p-$1: {{each: '*', class: '{PATROL}', rate: 10 Hz, on: $robot, robots: {{$robot: [pose]}}}}\n"
     )
     nodes = "nodes:\n  a: {robots: ['*-1']}\n  b: {robots: ['*-2']}\n"
-    text = hall(f"{ROVER}robots:\n  r: {FLEET}, count: 1, spare: 1}}\n{nodes}{pilots}")
+    fleet = "robots:\n  r: {like: rover, x: -15 m, y: 10 m, spacing: {x: 2 m}, count: 1, spare: 1}\n"
+    text = hall(ROVER + fleet + nodes + pilots)
     deployment = load_deployment(text, "hall")
     assert deployment.owners() == {"r-1": "a", "r-2": "b"}
     assert {player.on for player in deployment.players.values()} == {"r-1", "r-2"}
