@@ -520,13 +520,13 @@ def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     Nothing is known of robots whose state follows from files that are not there. What many robots share, by a template,
     is checked once.
     """
-    kits, lacks_files = deployment.kits, deployment.lacks_files
+    kits = deployment.kits
     met: set[tuple[int, int]] = set()
     for section, entities in (("robots", deployment.robots), ("objects", deployment.objects)):
         for name, entity in entities.items():
             model, place = entity.component_type, (section, name)
             try:
-                is_known = model.declared is not None or not lacks_files
+                is_known = model.declared is not None or not deployment.lacks_files
                 having = model.fields_of(entity, deployment) if is_known else None
             except BadValue as bad:
                 value = entity.model if bad.value is ABSENT else bad.value
