@@ -198,9 +198,9 @@ def _value_columns(deployment: Deployment) -> dict[str, Column]:
 
     Of what is not one number the value is JSON. A field that is called as a column of packets begins with `command_`.
     """
-    kinds = {settings.kind for robot in deployment.robots.values() for settings in robot.actuators.values()}
+    kinds = {its.kind: its.component_type for robot in deployment.robots.values() for its in robot.actuators.values()}
     found: dict[str, Column] = {}
-    for field in (field for kind in sorted(kinds) for field in codec_of(kind, "actuator").fields):
+    for field in (field for _, one in sorted(kinds.items()) for field in codec_of(one).fields):
         name = f"command_{field.name}" if field.name in _COMMAND_FIELDS else field.name
         column = Column(name, "number" if field.is_number else "json", field.unit)
         known = found.get(field.name, column)

@@ -8,7 +8,7 @@ before the network.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cache, partial
+from functools import partial
 from typing import Any, Final, TypeAlias
 
 from foxglove.messages import LaserScan, LocationFix, Pose, PoseInFrame, Quaternion, Timestamp, Vector3
@@ -22,7 +22,7 @@ from foosim.world.assembly.world import build_scene
 from foosim.world.components.mounted import link_index
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
+from foosim.world.forms.settings import SensorSettings
 from foosim.world.forms.shown import LASER_SCAN, LOCATION_FIX, MESSAGES, POSE, POSE_IN_FRAME
 from foosim.world.layout import build_layout
 from foosim.world.placing import FIRST_LINK, MountedAt
@@ -50,20 +50,19 @@ def shown_topics(deployment: Deployment) -> dict[str, TopicSchema]:
     return {
         _topic(robot, channel): ("protobuf", view_schema(MESSAGE_TYPES[message]))
         if message
-        else ("json", _json_schema(deployment.robots[robot].sensors[channel].kind))
+        else ("json", _json_schema(deployment.robots[robot].sensors[channel]))
         for (robot, channel), message in _shown(deployment).items()
     }
 
 
-@cache
-def _json_schema(kind: str) -> tuple[str, str, bytes]:
+def _json_schema(sensor: SensorSettings) -> tuple[str, str, bytes]:
     """Return that of a kind of sensor's readings: an object with their fields, each number with its `unit`."""
-    codec = codec_of(kind, "sensor")
+    codec = codec_of(sensor.component_type)
     schema = json_schema(codec.kind)
     for field in codec.fields:
         if field.unit:
             schema["properties"][field.name]["unit"] = field.unit
-    return f"foosim.reading.{kind}", "jsonschema", encode_json(schema)
+    return f"foosim.reading.{sensor.kind}", "jsonschema", encode_json(schema)
 
 
 class ShownReadings:
@@ -81,7 +80,7 @@ class ShownReadings:
             if message == LASER_SCAN:
                 assert frames is not None
                 make = partial(_scan, *frames.of(robot, settings), settings.bearings)
-            self._makers[robot, channel] = _topic(robot, channel), codec_of(settings.kind, "sensor"), make
+            self._makers[robot, channel] = _topic(robot, channel), codec_of(settings.component_type), make
 
     def messages(self, tick: int, packets: Iterable[RobotPacket]) -> Iterator[tuple[str, bytes]]:
         """Yield topic and message of each of the robots' packets at a tick that is such a reading.
@@ -110,7 +109,7 @@ def _shown(deployment: Deployment) -> dict[tuple[str, str], str]:
     found = {}
     for robot, its in sorted(deployment.robots.items()):
         for channel, settings in sorted(its.sensors.items()):
-            sensor = find_component("sensor", settings.kind)
+            sensor = settings.component_type
             if sensor.shown_as or not sensor.is_own:
                 found[robot, channel] = sensor.shown_as
     return found

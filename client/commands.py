@@ -16,7 +16,6 @@ from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
 from foosim.world.forms.payloads import Field, PayloadCodec
 from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
 
 
 class Taker(NamedTuple):
@@ -160,8 +159,8 @@ class CommandEncoder:
     def _takers_of(self, robot: str) -> tuple[Taker, ...]:
         takers = []
         for channel, its in sorted(self._deployment.robots[robot].actuators.items()):
-            codec = codec_of(its.kind, "actuator")
-            named = find_component("actuator", its.kind).joints_named(its) if _is_several(codec) else None
+            codec = codec_of(its.component_type)
+            named = its.component_type.joints_named(its) if _is_several(codec) else None
             takers.append(Taker(robot, channel, codec, named or ()))
         return tuple(takers)
 

@@ -23,7 +23,6 @@ from foosim.client.player import Commands, Samples
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.world.forms.jobs import JOB, JobState
-from foosim.world.forms.registry import find_component
 from foosim.world.sensors.job import Jobs as Reading
 from foosim.world.sensors.job import JobSettings
 
@@ -88,7 +87,7 @@ class Jobs:
         self._taker: Taker = CommandEncoder(deployment).actuator(robot, actuator)
         its = deployment.robots[robot]
         self.what: Final = f"{robot}/{actuator}"
-        kind = find_component("actuator", its.actuators[actuator].kind)
+        kind = its.actuators[actuator].component_type
         self._failures: Mapping[float, str] = getattr(kind.made, "FAILURES", {})
         if not kind.jobs:
             raise BadValue(f"{self.what} does no jobs", its.actuators[actuator].kind)

@@ -20,7 +20,7 @@ def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> Payloa
     if robot is None or channel == CHANNEL_ECHO:
         return None
     if channel in robot.sensors:
-        return codec_of(robot.sensors[channel].kind, "sensor")
+        return codec_of(robot.sensors[channel].component_type)
     if channel in robot.actuators:
-        return codec_of(robot.actuators[channel].kind, "actuator")
+        return codec_of(robot.actuators[channel].component_type)
     raise UnknownName(f"{endpoint} has no such channel", channel, [*robot.sensors, CHANNEL_ECHO, *robot.actuators])

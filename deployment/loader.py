@@ -2,7 +2,7 @@
 
 The text is scanned before anything is built (text/yaml.py), with what it includes (text/includes.py), expanded
 (text/expand.py), then checked against the schema (schema.py, schema_errors.py) and for what lies between its parts
-(checks.py and its neighbours). Every problem becomes one line,
+(validate.py). Every problem becomes one line,
 
     deploy/table.yaml:7:11: nodes.red.robots[1]: unknown robot, 'red.atack', nearest is 'red.attack'
 
@@ -21,18 +21,15 @@ from pydantic import ValidationError
 from foosim.common import limits
 from foosim.common.errors import DeploymentError, describe
 from foosim.common.finding import Finding
-from foosim.deployment.checks import DEPLOYMENT_KEYS, Names, check_references
-from foosim.deployment.components import check_components, read_components
+from foosim.deployment.components import read_components
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.rules import Network
-from foosim.deployment.network_checks import check_network, check_phase
 from foosim.deployment.overrides import place_sets
-from foosim.deployment.radio_checks import place_findings, rule_findings
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema_errors import schema_findings
-from foosim.deployment.text.each import without_places_by_node
 from foosim.deployment.text.expand import Expanded, expand
 from foosim.deployment.text.includes import Source, read_source
+from foosim.deployment.text.made import without_places_by_node
 from foosim.deployment.text.places import Places
 from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.deployment.text.selection import TooManyComparisons
@@ -48,23 +45,16 @@ from foosim.deployment.text.yaml import (
     Tree,
     measure,
     plain,
-    plain_shared,
     write_yaml,
 )
-from foosim.deployment.timing_checks import check_timing
-from foosim.world.assembly.misfits import (
-    doubled_slots,
-    engine_findings,
-    field_findings,
-    lasting_spares,
-    unfit_components,
-    unheard,
-)
-from foosim.world.assembly.sections import findings_of
-from foosim.world.assembly.used_forms import foreign_versions
-from foosim.world.forms import registry
-from foosim.world.moving.upright import stands_upright
+from foosim.deployment.validate import needs, stages
+from foosim.deployment.validate_network import Names, check_network, rule_findings
+from foosim.world.spec import KITS
 
+DEPLOYMENT_KEYS: Final = frozenset(
+    field.alias or name for name, field in Deployment.model_fields.items() if name != KITS
+)
+"""The keys of a deployment that are no kit's."""
 DEPLOYMENTS_KEPT: Final = 32
 """Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
 The swarm's worlds are 25 texts."""
@@ -74,10 +64,9 @@ SECTION_OF_KEY: Final = {"model": "robots", "shape": "scenery", "class": "player
 Text = str | Source
 """A deployment's text, alone or with the files that it includes."""
 
-_kept: dict[tuple[Text, str], Deployment] = {}
-"""By text and name, the least recently used first."""
-_trees: dict[tuple[Text, str], Tree] = {}
-"""Of canonical texts what they were made from, with its places in the files as written."""
+_kept: dict[tuple[Text, str], tuple[Deployment, Tree | None]] = {}
+"""By text and name, the least recently used first; of canonical texts with what they were made from, with its places in
+the files as written."""
 
 
 def load_deployment(text: Text, name: str) -> Deployment:
@@ -85,8 +74,8 @@ def load_deployment(text: Text, name: str) -> Deployment:
 
     Equal texts give one value, which nobody changes: all processes of a rehearsal load the same.
     """
-    known = _kept.pop((text, name), None)
-    return _keep(text, name, known or read_deployment(text, name))
+    known = _kept.pop((text, name), None) or (read_deployment(text, name), None)
+    return _keep(text, name, *known)
 
 
 def read_deployment(text: Text, name: str) -> Deployment:
@@ -94,11 +83,11 @@ def read_deployment(text: Text, name: str) -> Deployment:
     return _check(*read_source(text, name))
 
 
-def _keep(text: Text, name: str, deployment: Deployment) -> Deployment:
-    """Cache a text's deployment as the most recently used."""
+def _keep(text: Text, name: str, deployment: Deployment, tree: Tree | None) -> Deployment:
+    """Cache a text's deployment as the most recently used, with the tree that it was made from."""
     while len(_kept) >= DEPLOYMENTS_KEPT:
         _kept.pop(next(iter(_kept)))
-    _kept[text, name] = deployment
+    _kept[text, name] = deployment, tree
     return deployment
 
 
@@ -153,11 +142,7 @@ def _applied(
             problems.append(Problem(there.place, describe("missing key", "network")))
     tree, problems = _with_sets(tree, problems, sets)
     canonical = _canonical(tree)
-    _keep(canonical, name, _check(tree, problems))
-    while len(_trees) >= DEPLOYMENTS_KEPT:
-        _trees.pop(next(iter(_trees)))
-    if tree is not None:
-        _trees[canonical, name] = tree
+    _keep(canonical, name, _check(tree, problems), tree)
     return canonical
 
 
@@ -216,7 +201,7 @@ def load_network(text: Text, name: str, sets: Sequence[str] = ()) -> Network | N
     except ValidationError as error:
         findings = schema_findings(error, ("network",))
     else:
-        of_itself = list(islice(check_network(network, Names(()), data.get("radios") or {}), PROBLEMS_MAX + 1))
+        of_itself = list(islice(check_network(network, Names(())), PROBLEMS_MAX + 1))
         findings = iter(of_itself) if of_itself else rule_findings(Profiles(network, {}, ""), ())
     places = Places(tree, tree, {})
     found = [*problems, *set_problems, *map(places.problem, islice(findings, PROBLEMS_MAX + 1))]
@@ -231,19 +216,10 @@ def check_complete(text: Text, name: str, deployment: Deployment) -> None:
 
     `text` and `name` are what the deployment was loaded from. Raises DeploymentError.
     """
-    parts = [_open_meshes(deployment), field_findings(deployment)]
-    states = _state_findings(deployment) if deployment.asset_files else ()
-    found = (list(islice(part, PROBLEMS_MAX + 1)) for part in chain(parts, states))
-    refuse_findings(text, name, next(filter(None, found), []))
-
-
-def _open_meshes(deployment: Deployment) -> Iterator[Finding]:
-    """Meshes that are not closed, of a material of which it is not said how thick."""
-    for thing in deployment.open_meshes():
-        radio = deployment.scenery[thing].radio
-        material = "concrete" if radio is None or radio.is_ is None else radio.is_
-        what = f"a wall without a thickness: the mesh is not closed, write {{is: {material}, thickness: 10 cm}}"
-        yield Finding(("scenery", thing, "radio"), what, material)
+    ends = Names(deployment.endpoints())
+    for stage in stages(deployment, with_files=True):
+        found = chain.from_iterable(check.find(deployment, ends) for check in stage)
+        refuse_findings(text, name, list(islice(found, PROBLEMS_MAX + 1)))
 
 
 def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Sequence[str] = ()) -> None:
@@ -252,7 +228,7 @@ def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Se
     `text`, `name` and `sets` are what it was loaded from.
     """
     if findings:
-        tree = _trees.get((text, name)) if not sets else None
+        _, tree = (_kept.get((text, name)) if not sets else None) or (None, None)
         if tree is None:
             tree, _ = _with_sets(*read_source(text, name), sets)
         assert tree is not None, "it was loaded"
@@ -284,7 +260,7 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     """The deployment that a tree is, and the problems of what is in it: those of fields by themselves, else between
     fields, else of the world that they make. Raises TooManyComparisons."""
     assert expanded.tree is not None, "it can be examined"
-    data = plain_shared(expanded.tree)
+    data = plain(expanded.tree)
 
     def first(*findings: Iterable[Finding]) -> list[Finding]:
         return list(islice(places.distinct(chain(*findings), expanded.broken), PROBLEMS_MAX + 1))
@@ -293,51 +269,12 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     within = [*first(of_fields), *first(_unused_findings(data, expanded))]
     if deployment is None or within:
         return deployment, [*map(places.problem, within)]
-    network, ends = deployment.network, Names(deployment.endpoints())
-    of_network = check_network(network, ends, (data.get("network") or {}).get("radios") or {})
-    between = first(check_references(deployment, ends), of_network, check_phase(network, deployment.tick_ns))
-    within = first(check_timing(deployment, ends)) or first(check_components(deployment))
-    if not between and not within:
-        states = () if deployment.lacks_files else _state_findings(deployment)
-        rules = rule_findings(deployment.profiles(), ends.endpoints)
-        whole = chain(findings_of(deployment), engine_findings(deployment), rules, place_findings(deployment))
-        between = next(filter(None, map(first, chain(states, [whole]))), [])
-    return deployment, [*(places.problem(finding, is_made=True) for finding in between), *map(places.problem, within)]
-
-
-def _state_findings(deployment: Deployment) -> Iterator[Iterable[Finding]]:
-    """What is wrong with the state of a world, whose robots' files must be there; each part rests on those before."""
-    yield doubled_slots(deployment)
-    yield lasting_spares(deployment)
-    yield unheard(deployment)
-    yield _trial_findings(deployment)
-    yield chain(_start_findings(deployment), unfit_components(deployment))
-
-
-def _trial_findings(deployment: Deployment) -> Iterable[Finding]:
-    """What a trial of forms of other packages finds; foosim's own are not tried."""
-    if not foreign_versions(deployment):
-        return ()
-    from foosim.world.assembly.trial import trial_findings  # brings numpy
-
-    return trial_findings(deployment)
-
-
-def _start_findings(deployment: Deployment) -> Iterator[Finding]:
-    """What starts in something: robots that move by kinematics and are no kit's, and rigid bodies; and events."""
-    if any(map(stands_upright, deployment.robots.values())):
-        from foosim.world.clearance.start import start_findings  # brings numpy
-
-        yield from start_findings(deployment)
-    bodies = *deployment.robots.values(), *deployment.objects.values()
-    if any(one.is_rigid and one.couples for one in map(registry.model_of, bodies)):
-        from foosim.world.clearance.overlaps import overlap_findings  # brings numpy
-
-        yield from overlap_findings(deployment)
-    if deployment.events:
-        from foosim.world.setting.scheduled import event_findings  # brings numpy
-
-        yield from event_findings(deployment)
+    ends = Names(deployment.endpoints())
+    for stage in stages(deployment):
+        found = [(check, finding) for check in stage for finding in first(check.find(deployment, ends))]
+        if found:
+            return None, [places.problem(finding, is_made=not check.of_entries) for check, finding in found]
+    return deployment, []
 
 
 def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:
@@ -356,8 +293,8 @@ def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
         section = next((of for key, of in SECTION_OF_KEY.items() if key in whole.values), None)
         if section is None:
             continue
-        _, findings = _validated({**data, section: {name: plain(whole)}})
-        for finding in findings:
+        deployment, findings = _validated({**data, section: {name: plain(whole)}})
+        for finding in chain(findings, () if deployment is None else needs(deployment, Names(()))):
             if finding.location[:2] == (section, name) and finding.at != "missing":
                 yield replace(finding, location=(TEMPLATES, *finding.location[1:]))
 

@@ -16,10 +16,10 @@ from foosim.client.commands import CommandEncoder
 from foosim.client.player import Commands, Packet, Sample
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.event_requests import event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import ClientSpec, Deployment
 from foosim.deployment.text.files import read_deployment_text
+from foosim.deployment.validate_network import event_text
 from foosim.node.physics.mesh_trial import check_shapes
 from foosim.protocol.messages import Sent
 from foosim.simulation.agents import LEARNER, Agent, Pair, Resident, agents_of

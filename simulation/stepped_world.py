@@ -17,7 +17,6 @@ from foosim.node.physics.interface import AnyEngine
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Term, Work
 from foosim.world.edits import Edit
-from foosim.world.forms.registry import model_of
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.robot_packets import Delivered, RobotPacket
@@ -28,7 +27,7 @@ ONE_NODE: Final = "n1"
 
 def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
     """Return the robots of n1 to nN, dealt in turn: first those that engines solve, then others, each in name order."""
-    rigid = sorted(name for name, robot in deployment.robots.items() if model_of(robot).is_rigid)
+    rigid = sorted(name for name, robot in deployment.robots.items() if robot.component_type.is_rigid)
     others = sorted(set(deployment.robots) - set(rigid))
     dealt: dict[str, list[str]] = {f"n{number + 1}": [] for number in range(nodes)}
     for place, name in enumerate([*rigid, *others]):

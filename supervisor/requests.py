@@ -17,9 +17,9 @@ from foosim.common import limits
 from foosim.common.errors import BadValue, Malformed, Refused, show
 from foosim.common.json_text import decode_json, encode_json
 from foosim.common.units import parse_pace
-from foosim.deployment.event_requests import event_text
 from foosim.deployment.network.rules import EVENTS_MAX, event_of
 from foosim.deployment.network.settings_text import event_words
+from foosim.deployment.validate_network import event_text
 from foosim.protocol import channels
 from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.supervisor.load_balancing import WORTH, loads_of, shifts_at_once

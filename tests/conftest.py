@@ -28,7 +28,6 @@ from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime import GC_THRESHOLDS
 from foosim.world.forms import registry
-from foosim.world.forms.per_field import codec_of
 from tests.meter import Burden, Meter, measured_seconds, scope_of
 
 settings.register_profile(
@@ -109,8 +108,6 @@ def _own_forms_are_forgotten(tmp_path_factory: pytest.TempPathFactory) -> Iterat
     theirs = [key for key in registry._known.keys() - known if not registry._known[key].module.startswith("foosim.")]
     for key in theirs:
         del registry._known[key]
-    if theirs:
-        codec_of.cache_clear()
     if registry._loaded != loaded:
         registry._loaded.clear()
         registry._loaded.update(loaded)

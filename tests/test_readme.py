@@ -30,6 +30,7 @@ from foosim.simulation.run import rehearse
 from foosim.simulation.system import System
 from foosim.world.actuators.rod_position import Command
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 
 ROOT: Final = Path(__file__).parents[1]
 FRONT: Final = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
@@ -135,7 +136,8 @@ def test_the_readmes_player_plays(house: Path) -> None:
     sent = capture.packets.where(capture.packets.source == "player-red")
     rods = [f"red.{line}" for line in ("goal", "defence", "midfield", "attack")]
     assert set(sent.destination) == set(rods)
-    commands: list[Command] = [codec_of("rod_position", "actuator").decode(payload) for payload in sent.payload]
+    codec = codec_of(find_component("actuator", "rod_position"))
+    commands: list[Command] = [codec.decode(payload) for payload in sent.payload]
     assert {command.spin for command in commands} == {0.5, -1.2}
     assert any(capture.frames.column(rod, "contacts").any() for rod in rods)
     absent = capture.frames.column("ball-2", "absent")

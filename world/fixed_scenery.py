@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from foosim.world.forms import registry
 from foosim.world.scene import Shape
 from foosim.world.spec import WorldSpec
 
@@ -12,12 +11,12 @@ from foosim.world.spec import WorldSpec
 def kits_of(spec: WorldSpec) -> Iterator[tuple[str, object]]:
     """Yield the kits of a world, made from their sections, by name in name order."""
     for name, section in sorted(spec.kits.items()):
-        yield name, registry.find("kit", name).made(section, spec)
+        yield name, spec.kit_types[name].made(section, spec)
 
 
 def fixed_shapes(spec: WorldSpec) -> tuple[Shape, ...]:
     """Return the scenery of kits and scene, which never moves."""
     shapes = [shape for _, kit in kits_of(spec) for shape in kit.shapes()]  # type: ignore[attr-defined]
     if spec.scene is not None:
-        shapes += registry.find("scene", spec.scene.kind).made(spec.scene)
+        shapes += spec.scene.component_type.made(spec.scene)
     return tuple(shapes)

@@ -28,12 +28,10 @@ from foosim.world.forms.forms import (
     STILL_TICKS,
     Carrier,
     Component,
-    EntityRule,
     Kit,
     Model,
     Motion,
     References,
-    WorldRule,
 )
 from foosim.world.forms.jobs import job_slots
 from foosim.world.forms.per_field import Numbers, numbers_of
@@ -131,12 +129,12 @@ class Declared:
     lasting: frozenset[str] = frozenset()
     switched: frozenset[str] = frozenset()
     fields: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    variants: Mapping[str, Model] = field(default_factory=dict)
+    kinds: Mapping[str, Model] = field(default_factory=dict)
     demanded: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     def kind_of(self, name: str, model: str) -> Model:
         """Return what there is to know of an entity, by its name and that of its model."""
-        return self.variants.get(name) or _model(model)
+        return self.kinds.get(name) or _model(model)
 
     def fields_of(self, name: str, kind: Model) -> Mapping[str, int]:
         """Return the fields of the state of an entity of a model."""
@@ -272,7 +270,7 @@ def build_layout(spec: WorldSpec) -> Layout:
     models: dict[str, str] = {}
     lasting: set[str] = set()
     spares = {name for section in (spec.objects, spec.robots) for name, one in section.items() if one.spare}
-    for kit in kits_named(spec):
+    for kit in spec.kit_types.values():
         its = spares_of(spec, kit)
         models |= {**kit.entities, **its}
         spares |= its.keys()
@@ -281,15 +279,15 @@ def build_layout(spec: WorldSpec) -> Layout:
     if of_world:
         models[WORLD] = WORLD
     models |= {name: one.model for section in (spec.objects, spec.robots) for name, one in section.items()}
-    variants = _variants(spec)
-    fields = _fields(spec, {name: variants.get(name) or _model(model) for name, model in models.items()})
+    kinds = {name: one.component_type for section in (spec.objects, spec.robots) for name, one in section.items()}
+    fields = _fields(spec, {name: kinds.get(name) or _model(model) for name, model in models.items()})
     carried = {name: _carried(spec, name, robot) for name, robot in spec.robots.items()}
     carried |= {name: Carried(of_motion(_model(model)), {}) for name, model in models.items() if name not in carried}
     carried[WORLD] = Carried(of_world, {})
     demanded = {name: found for name, robot in spec.robots.items() if (found := _demanded(robot))}
     switched = frozenset([name for name, robot in spec.robots.items() if switches_of(robot)])
     coming = frozenset(spares), frozenset(lasting), switched
-    return Layout(models, Declared(carried, memory, *coming, fields, variants, demanded))
+    return Layout(models, Declared(carried, memory, *coming, fields, kinds, demanded))
 
 
 def switches_of(robot: RobotSettings) -> dict[str, int]:
@@ -300,13 +298,6 @@ def switches_of(robot: RobotSettings) -> dict[str, int]:
 def spares_of(spec: WorldSpec, kit: Kit) -> Mapping[str, str]:
     """Return what a kit of a world brings that is absent at the start, its models by name."""
     return {} if kit.spares is None else kit.spares(spec.kits[kit.name])
-
-
-def _variants(spec: WorldSpec) -> dict[str, Model]:
-    """Return what entities are whose settings ask for a variant of their model."""
-    everybody = [*spec.objects.items(), *spec.robots.items()]
-    found = ((name, one.model, registry.model_of(one)) for name, one in everybody)
-    return {name: kind for name, model, kind in found if kind is not registry.find_model(model)}
 
 
 def _fields(spec: WorldSpec, kinds: Mapping[str, Model]) -> dict[str, Mapping[str, int]]:
@@ -321,38 +312,8 @@ def _fields(spec: WorldSpec, kinds: Mapping[str, Model]) -> dict[str, Mapping[st
     return found
 
 
-def kits_named(spec: WorldSpec) -> list[Kit]:
-    """Return what is registered of the kits of a world, in name order."""
-    found = [registry.find("kit", name) for name in sorted(spec.kits)]
-    assert all(isinstance(kit, Kit) for kit in found), found
-    return [kit for kit in found if isinstance(kit, Kit)]
-
-
 def _model(kind: str) -> Model:
     return WORLD_MODEL if kind == WORLD else registry.find_model(kind)
-
-
-def world_rules(spec: WorldSpec) -> dict[str, ComponentSettings]:
-    """Return the rules of a world, by name, in name order: those of its kits, and those of the deployment."""
-    found: dict[str, ComponentSettings] = dict(spec.rules)
-    for kit in kits_named(spec):
-        for label, settings in kit.rules.items():
-            found[label] = registry.find("rule", settings["kind"]).settings.model_validate(dict(settings))  # type: ignore[assignment]
-    return dict(sorted(found.items()))
-
-
-def find_rule(settings: ComponentSettings) -> WorldRule:
-    """Return the registered rule of a world that settings are of."""
-    found = registry.find("rule", settings.kind)
-    assert isinstance(found, WorldRule), found
-    return found
-
-
-def find_entity_rule(settings: ComponentSettings) -> EntityRule:
-    """Return the registered rule of entities that settings are of."""
-    found = registry.find("entity_rule", settings.kind)
-    assert isinstance(found, EntityRule), found
-    return found
 
 
 def find_motion(model: Model) -> Motion:
@@ -366,8 +327,8 @@ def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]
     """Return what the rules of a world remember: of each entity, by its model; and of the world."""
     each: dict[str, dict[str, int]] = {}
     of_world: dict[str, int] = {}
-    for label, settings in world_rules(spec).items():
-        rule = find_rule(settings)
+    for label, settings in spec.world_rules.items():
+        rule = settings.component_type
         of_world |= _behind(label, rule.slots)
         for model, slots in rule.each.items():
             each.setdefault(model, {}).update(_behind(label, slots))
@@ -397,22 +358,22 @@ class Declaring:
 def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Declaring]:
     """Yield what declares slots on a robot: its motion, its components with their modifiers, and its rules."""
     place: Location = ("robots", name)
-    model = registry.model_of(robot)
+    model = robot.component_type
     fields = model.fields_of(robot, spec)
     joints = fields.get("joint_positions", 0)
     yield Declaring(f"motion {model.motion}", (*place, "model"), of_motion(model))
     for label, actuator in sorted(robot.actuators.items()):
-        component = registry.find_component("actuator", actuator.kind)
+        component = actuator.component_type
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
         if component.jobs:
             slots |= _behind(label, job_slots(spec.senders_to(name)))
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
-        slots = _behind(label, find_entity_rule(rule).slots_on(fields))
+        slots = _behind(label, rule.component_type.slots_on(fields))
         yield Declaring(f"rule {label}", (*place, "rules", label), slots)
     for label, sensor in sorted(robot.sensors.items()):
-        component = registry.find_component("sensor", sensor.kind)
+        component = sensor.component_type
         period_ns = least_period_ns(spec, component, sensor)
         slots = _slots(label, component, sensor, Carrier(0, period_ns, joints))
         slots |= _slots_of_modifiers(label, sensor.modifiers, numbers_of(component, sensor, fields), period_ns)
@@ -433,16 +394,12 @@ def slot_that_speaks(robot: Entity, channel: str, field: str) -> str:
 
 def _demanded(robot: RobotSettings) -> dict[str, int]:
     """Return the fields of a robot that its model has on demand."""
-    model = registry.model_of(robot)
+    model: Model = robot.component_type
     if not model.on_demand:
         return {}
-    components = [
-        (registry.find_component(form, its.kind), its)
-        for form, having in (("sensor", robot.sensors), ("actuator", robot.actuators))
-        for its in having.values()
-    ]
-    needs = [need for one, its in components for need in (*one.needs, one.speaks_by(its))]
-    needs += [need for its in robot.rules.values() for need in find_entity_rule(its).needs]
+    needs = [need for its in (*robot.actuators.values(), *robot.rules.values()) for need in its.component_type.needs]
+    for its in robot.sensors.values():
+        needs += [*its.component_type.needs, its.component_type.speaks_by(its)]
     return model.demanded(needs)
 
 
@@ -461,8 +418,7 @@ def _slots_of_modifiers(
     found: dict[str, int] = {}
     for label, settings in zip(modifier_labels(modifiers), modifiers, strict=True):
         assert numbers is not None, "checked with the deployment"
-        component = registry.find_component("modifier", settings.kind)
-        found |= _slots(f"{name}.{label}", component, settings, Carrier(numbers.size, period_ns))
+        found |= _slots(f"{name}.{label}", settings.component_type, settings, Carrier(numbers.size, period_ns))
     return found
 
 
@@ -485,7 +441,7 @@ def modifier_labels(modifiers: Sequence[ModifierSettings]) -> list[str]:
     """Return the names of the modifiers of a component: their kinds, numbered where there are several of one."""
     labels: list[str] = []
     for settings in modifiers:
-        kind = label = registry.find_component("modifier", settings.kind).name
+        kind = label = settings.component_type.name
         number = 1
         while label in labels:
             number += 1

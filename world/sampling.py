@@ -12,7 +12,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from foosim.common.names import CHANNEL_ECHO
-from foosim.world.forms import registry
 from foosim.world.frame import Frame
 from foosim.world.layout import slot_that_speaks
 from foosim.world.robot_packets import Delivered
@@ -30,7 +29,7 @@ class Sampling:
                 (name, channel, speaks)
                 for name, robot in spec.robots.items()
                 for channel, sensor in robot.sensors.items()
-                if (speaks := registry.find_component("sensor", sensor.kind).speaks_by(sensor))
+                if (speaks := sensor.component_type.speaks_by(sensor))
             }
         )
         """Robots with a sensor that speaks, its channel, and the field that makes it measure."""

@@ -1,7 +1,8 @@
 """The world part of a deployment: what is computed, and nothing of where it is computed or what lies between."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
+from functools import cached_property
 from math import gcd
 from typing import Annotated, Any, Final, NamedTuple, Protocol, Self, TypeVar
 
@@ -13,7 +14,7 @@ from foosim.common.units import Quantity, period_ticks
 from foosim.world.earth import EarthOrigin
 from foosim.world.events import EVENTS_MAX, WorldEvent
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Kit
+from foosim.world.forms.forms import Engine, Kit, Model
 from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
 from foosim.world.matter.mesh import AssetError, Mesh, check_digest
 from foosim.world.matter.physics import PhysicsSettings, SurfaceSettings
@@ -87,10 +88,17 @@ def schedule_of(timed: Timed, tick_ns: int) -> Schedule:
 
 def default_engine(world: Mapping[str, Any]) -> str:
     """Return the engine of a world (its sections by their fields) that names none."""
-    kits = [registry.find("kit", name) for name in world.get(KITS, {})]
-    models = [registry.find_model(name) for kit in kits if isinstance(kit, Kit) for name in kit.entities.values()]
-    models += map(registry.model_of, (*world.get("robots", {}).values(), *world.get("objects", {}).values()))
-    return "bullet" if any(model.shares_solve for model in models) else "mujoco"
+    models: list[Model | None] = [
+        registry.find_model(name) for kit in _kits(world.get(KITS, {})) for name in kit.entities.values()
+    ]
+    models += [one.component_type for section in ("robots", "objects") for one in world.get(section, {}).values()]
+    return "bullet" if any(model is not None and model.shares_solve for model in models) else "mujoco"
+
+
+def _kits(names: Iterable[str]) -> list[Kit]:
+    """Return kits by name, in name order."""
+    found = [registry.find("kit", name) for name in sorted(names)]
+    return [kit for kit in found if isinstance(kit, Kit)]
 
 
 class WorldSpec(SpecBase):
@@ -119,6 +127,28 @@ class WorldSpec(SpecBase):
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     engine: str = Field(default_factory=default_engine)
     _contents: Contents = PrivateAttr(default_factory=Contents)
+
+    @cached_property
+    def engine_type(self) -> Engine:
+        """The registered engine."""
+        found = registry.find("engine", self.engine)
+        assert isinstance(found, Engine), found
+        return found
+
+    @cached_property
+    def kit_types(self) -> Mapping[str, Kit]:
+        """The registered kits, by name in name order."""
+        return {kit.name: kit for kit in _kits(self.kits)}
+
+    @cached_property
+    def world_rules(self) -> Mapping[str, RuleSettings]:
+        """The rules of the world, by name in name order: those of its kits, and those of the deployment."""
+        found = dict(self.rules)
+        for kit in self.kit_types.values():
+            for label, data in kit.rules.items():
+                rule = registry.find("rule", data["kind"])
+                found[label] = rule.settings.model_validate(dict(data)).typed(rule)  # type: ignore[attr-defined]
+        return dict(sorted(found.items()))
 
     def section(self, kit: str, kind: type[Section]) -> Section:
         """Return the section of a kit that this world has."""

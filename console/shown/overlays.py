@@ -10,7 +10,6 @@ import numpy as np
 from foosim.deployment.schema import Deployment
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.view import ComponentError, called
-from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
@@ -25,8 +24,7 @@ class Overlays:
         """Sensors that send rays, by their class and the length of their readings."""
         self._failures: list[str] = []
         for robot in layout.robots:
-            kinds = {sensor.kind for sensor in deployment.robots[robot.name].sensors.values()}
-            if any(hasattr(registry.find_component("sensor", kind).made, "rays") for kind in kinds):
+            if any(hasattr(its.component_type.made, "rays") for its in deployment.robots[robot.name].sensors.values()):
                 for fitted in self._sensors_of(deployment, layout, robot):
                     if hasattr(fitted.sensor, "rays"):
                         self._groups.setdefault((type(fitted.sensor), fitted.size), []).append(fitted)

@@ -149,7 +149,7 @@ def _actuators(deployment: Deployment, robot: str) -> list[tuple[str, PayloadCod
     """Return the channels of a robot's actuators, and the codecs of their commands."""
     settings = deployment.robots.get(robot)
     actuators = {} if settings is None else settings.actuators
-    return [(channel, codec_of(actuator.kind, "actuator")) for channel, actuator in sorted(actuators.items())]
+    return [(channel, codec_of(actuator.component_type)) for channel, actuator in sorted(actuators.items())]
 
 
 def _commands(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
@@ -177,7 +177,7 @@ def _runs(count: int, units: int) -> list[tuple[int, int]]:
 
 def _sensors(deployment: Deployment) -> list[dict[str, str]]:
     return [
-        {"robot": name, "channel": channel, "kind": sensor.kind, "unit": codec_of(sensor.kind, "sensor").unit}
+        {"robot": name, "channel": channel, "kind": sensor.kind, "unit": codec_of(sensor.component_type).unit}
         for name, robot in sorted(deployment.robots.items())
         for channel, sensor in sorted(robot.sensors.items())
     ]

@@ -3,9 +3,10 @@
 A radio names a preset and writes what differs: a preset is the same keys with a source for each value (`presets`).
 """
 
-from typing import Annotated, Any, Final, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from foosim.common import units
 from foosim.common.spec_base import Name, SpecBase, default
@@ -150,13 +151,22 @@ class Radio(RadioKeys):
 
     preset: PresetName = "perfect"
 
-    @model_validator(mode="before")
+    _written: Mapping[str, Any] = PrivateAttr(default_factory=dict)
+
+    @property
+    def written(self) -> Mapping[str, Any]:
+        """What the file says of it, as plain data; the rest is of its preset."""
+        return self._written
+
+    @model_validator(mode="wrap")
     @classmethod
-    def _take_preset(cls, value: Any) -> Any:
+    def _take_preset(cls, value: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
         """Settings over those of their preset; the payloads of LoRa are as long as its spreading factor lets them."""
         name = value.get("preset", "perfect") if isinstance(value, dict) else None
         if not isinstance(name, str) or name not in PRESETS:
-            return value
+            return read(value)
         merged = over(preset_settings(name), value)
         longest = lora_longest(merged.get("spreading_factor", 7)) if merged.get("medium") == "lora" else None
-        return merged if longest is None or "mtu" in value else {**merged, "mtu": f"{longest} B"}
+        radio = read(merged if longest is None or "mtu" in value else {**merged, "mtu": f"{longest} B"})
+        radio._written = value
+        return radio

@@ -12,16 +12,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 from foosim.common import limits
 from foosim.common.errors import BadValue
 from foosim.common.finding import Location
 from foosim.common.names import nearest_quoted
-from foosim.deployment.text.each import EACH, BadSign, Each, Filling, put
-from foosim.deployment.text.fleets import Fleet, fleet_and_number, members, read_fleets
 from foosim.deployment.text.includes import INCLUDE
+from foosim.deployment.text.made import COUNT, EACH, SPACING, SPARE, BadSign, Change, counted, filled_entry, put
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.selection import Chosen, Population, TooManyComparisons, is_several
 from foosim.deployment.text.templates import LIKE, TEMPLATES, Templates, merged, with_preset, without
@@ -30,13 +29,13 @@ from foosim.world.scenery import SCENERY_MAX
 
 REST: Final = "rest"
 ROBOTS: Final = "robots"
-FLEETS: Final[Mapping[str, int]] = {
+FLEETS: Final[dict[str, int]] = {
     ROBOTS: limits.ENTITIES_MAX,
     "objects": limits.ENTITIES_MAX,
     "scenery": SCENERY_MAX,
 }
 """Sections whose entries may have a count, and how many entries there are at most."""
-FOR_ROBOTS: Final[Mapping[str, int]] = {"players": limits.CLIENTS_MAX, "clients": limits.CLIENTS_MAX}
+FOR_ROBOTS: Final[dict[str, int]] = {"players": limits.CLIENTS_MAX, "clients": limits.CLIENTS_MAX}
 """The same of those whose entries may be for each robot."""
 ENTRIES: Final = (*FLEETS, *FOR_ROBOTS)
 """Sections whose entries may be like templates."""
@@ -54,10 +53,6 @@ class Expanded:
     problems: list[Problem] = field(default_factory=list)
     broken: frozenset[tuple[str, str]] = frozenset()
     unused: Mapping[str, tuple[Fields, Place]] = field(default_factory=dict)
-
-
-_Made = tuple[Each, dict[str, str]]
-"""What is made for a robot: from which entry, with which values for its signs."""
 
 
 def expand(tree: Tree) -> Expanded:
@@ -78,7 +73,7 @@ def _example(template: Fields) -> Fields:
     """Return a template as it could be for a robot; itself where its signs are wrong."""
     with suppress(BadSign):
         signs = {"$": "$", "robot": "robot"} | dict.fromkeys("123456789", "1")
-        example = Filling().entry(template, signs, "node")
+        example = filled_entry(template, signs, "node")
         return example if isinstance(example, Fields) else template
     return template
 
@@ -89,10 +84,7 @@ class Expansion:
     def __init__(self, tree: Fields, report: Report) -> None:
         self._tree = tree
         self._report = report
-        self._filling = Filling()
-        self._fleets: dict[str, dict[str, Fleet]] = {}
-        self._for_robots: dict[str, dict[str, _Made]] = {}
-        self._usual: dict[tuple[str, str], Tree] = {}
+        self._made: dict[str, dict[str, dict[str, Change]]] = {}
         self._named_robots: dict[int, tuple[Fields, Fields]] = {}
         self._unmatched: set[Place] = set()
         self.templates = Templates(tree, report)
@@ -122,46 +114,122 @@ class Expansion:
             return Fields(section.place, {one: node for one, node in wholes.items() if node is not None})
         if name == ROBOTS:
             return self._robots
-        if name in FLEETS:
-            return self._section_of_fleets(name, section)
-        if name in FOR_ROBOTS:
-            return self._section_for_robots(name, section)
+        if name in ENTRIES:
+            return self._entries(name, section)
         return self._nodes if name == "nodes" else with_preset(name, section, self._report)
 
-    # --- fleets -------------------------------------------------------------------------------------------------------
+    # --- entries ------------------------------------------------------------------------------------------------------
 
     @cached_property
     def _robots(self) -> Tree | None:
         section = self._tree.values.get(ROBOTS)
-        return self._section_of_fleets(ROBOTS, section) if isinstance(section, Fields) else section
+        return self._entries(ROBOTS, section) if isinstance(section, Fields) else section
 
     @cached_property
     def _population(self) -> Population:
         """The robots' names."""
         return Population(self._robots.values if isinstance(self._robots, Fields) else ())
 
-    def _fleets_of(self, name: str, section: Fields) -> dict[str, Fleet]:
-        if name not in self._fleets:
-            self._fleets[name] = read_fleets(section, name, FLEETS[name], self._report)
-        return self._fleets[name]
-
-    def _section_of_fleets(self, name: str, section: Fields) -> Fields:
-        fleets = self._fleets_of(name, section)
-        whole = Fields(section.place)
+    def _entries(self, name: str, section: Fields) -> Fields:
+        """Return a section with all entries that it has or makes, each in the place of the one that makes it."""
+        if name not in self._made:
+            self._made[name] = self._makes(name, section)
+        made, whole = self._made[name], Fields(section.place)
+        others = {one for changes in made.values() for one in changes}
         for key, entry in section.values.items():
-            if key in fleets:
-                for made, place, node in members(section, fleets[key], self.templates, self._report):
-                    whole.values[made], whole.keys[made] = node, place
-            elif fleet_and_number(key, fleets) is None:
-                whole.values[key], whole.keys[key] = self._like(name, key, entry, section.keys[key]), section.keys[key]
+            if key in made and isinstance(entry, Fields):
+                raw, path = without(entry, EACH, COUNT, SPACING, *([SPARE] if _has_spares(entry) else [])), (name, key)
+                usual = self.templates.applied(raw, path)
+                for one, change in made[key].items():
+                    place = section.keys.get(one, section.keys[key])
+                    node = self._changed(usual, raw, path, one, change, section.values.get(one))
+                    self._report.count(node, place, path)
+                    whole.values[one], whole.keys[one] = self._with_robots(node, (name, one)), place
+            elif key not in others:
+                node = self.templates.applied(entry, (name, key))
+                if node is not entry:
+                    self._report.count(node, section.keys[key], (name, key))
+                whole.values[key], whole.keys[key] = self._with_robots(node, (name, key)), section.keys[key]
         return whole
 
-    def _like(self, name: str, key: str, entry: Tree, place: Place) -> Tree:
-        """Return an entry with what it is like."""
-        whole = self.templates.applied(entry, (name, key))
-        if whole is not entry:
-            self._report.count(whole, place, (name, key))
-        return whole
+    def _changed(
+        self, usual: Tree, raw: Fields, path: tuple[str, str], one: str, change: Change, own: Tree | None
+    ) -> Tree:
+        """Return one of what an entry makes, with what is written of it alone."""
+        if isinstance(own, Fields) and LIKE in own.values:
+            like = Fields(own.place, {LIKE: own.values[LIKE]}, {LIKE: own.keys[LIKE]})
+            usual, own = self.templates.applied(merged(raw, like), (path[0], one)), without(own, LIKE)
+        elif path in self._report.broken:
+            self._report.broken.add((path[0], one))
+        try:
+            node = change(usual)
+            if own is None:
+                return node
+            return merged(node, change(own) if path[0] in FOR_ROBOTS else own)
+        except BadSign as sign:
+            self._report.add_value(sign.place, path, sign.bad)
+            self._report.stop()
+
+    def _makes(self, name: str, section: Fields) -> dict[str, dict[str, Change]]:
+        """Return what entries of a section make, by their keys and the names of these. It is not known what there is
+        where that is wrong, so then it is the end."""
+        report, most, problems = self._report, (FLEETS | FOR_ROBOTS)[name], len(self._report.problems)
+        found: dict[str, dict[str, Change]] = {}
+        maker: dict[str, str] = {}
+        for key, entry in section.values.items():
+            if not isinstance(entry, Fields):
+                continue
+            path = name, key
+            if name in FLEETS:
+                changes = counted(entry, path, most, report)
+            elif EACH in entry.values:
+                changes = self._for_each(entry, path, section.keys[key], maker)
+            else:
+                continue
+            if changes or name in FOR_ROBOTS:
+                found[key] = changes
+            maker |= dict.fromkeys(changes, key)
+            longest = max(changes, key=len, default="")
+            if len(longest) > limits.NAME_LENGTH_MAX:
+                what = f"it makes a name of {len(longest)} characters, more than {limits.NAME_LENGTH_MAX}"
+                report.add(section.keys[key], path, what, longest)
+        for key in found.keys() & maker.keys():
+            by, place, _ = _maker(section, key)
+            report.add(place, (name, key), f"a {by} of what the entry {maker[key]} makes", by)
+        total = len(section.values.keys() - found.keys() - maker.keys()) + len(maker)
+        if total > most and maker:
+            key, changes = max(found.items(), key=lambda item: len(item[1]))
+            by, _, place = _maker(section, key)
+            report.add(place, (name, key, by), f"with it there are {total} {name}, more than {most}", len(changes))
+        if len(report.problems) > problems:
+            report.stop()
+        return found
+
+    def _for_each(
+        self, entry: Fields, path: tuple[str, str], place: Place, known: Mapping[str, str]
+    ) -> dict[str, Change]:
+        """Return what an entry makes for robots; names in `known` are made already."""
+        node, key, found = entry.values[EACH], path[1], dict[str, Change]()
+        text = plain(node)
+        if not isinstance(text, str):
+            self._report.add(node.place, (*path, EACH), "not a selector", text)
+        elif self._population.names and "$" not in key:
+            what = "the name of what is made for each robot has $robot or $1 in it"
+            self._report.add(place, path, what, key, repr(f"{key}-{'$1' if is_several(text) else '$robot'}"))
+        elif self._population.names:
+            for robot, parts in self._chosen(text, node.place, (*path, EACH)):
+                values = {"$": "$", "robot": robot} | {str(number): part for number, part in enumerate(parts, 1)}
+                try:
+                    one = put(key, place, values)
+                except BadSign as sign:
+                    self._report.add_value(place, path, sign.bad)
+                    break
+                if one in found or one in known:
+                    what = f"a name that is made twice, also by {known.get(one, key)}"
+                    self._report.add(place, path, what, one)
+                    break
+                found[one] = partial(filled_entry, values=values, node=self._owners.get(robot))
+        return found
 
     # --- the lists of nodes -------------------------------------------------------------------------------------------
 
@@ -242,94 +310,6 @@ class Expansion:
             self._report.add(place, path, "a selector that matches no robot", text, nearest)
         return chosen
 
-    # --- entries for each robot ---------------------------------------------------------------------------------------
-
-    def _section_for_robots(self, name: str, section: Fields) -> Fields:
-        eaches = self._eaches_of(name, section)
-        made: dict[str, list[str]] = {}
-        for one, (each, _) in eaches.items():
-            made.setdefault(each.path[1], []).append(one)
-        whole = Fields(section.place)
-        for key, entry in section.values.items():
-            if EACH in _keys(section, key):
-                for one in made.get(key, ()):
-                    place = section.keys.get(one, section.keys[key])
-                    node = self._filled(name, one, *eaches[one], section.values.get(one))
-                    self._report.count(node, place, (name, key))
-                    whole.values[one], whole.keys[one] = self._with_robots(node, (name, one)), place
-            elif key not in eaches:
-                node = self._like(name, key, entry, section.keys[key])
-                whole.values[key], whole.keys[key] = self._with_robots(node, (name, key)), section.keys[key]
-        return whole
-
-    def _filled(self, section: str, name: str, each: Each, values: Mapping[str, str], own: Tree | None) -> Tree:
-        """Return an entry for one robot, with what is written of it alone."""
-        raw, path = each.raw, each.path
-        if isinstance(own, Fields) and LIKE in own.values:
-            like = Fields(own.place, {LIKE: own.values[LIKE]}, {LIKE: own.keys[LIKE]})
-            path, own = (section, name), without(own, LIKE)
-            whole = self.templates.applied(merged(raw, like), path)
-        else:
-            whole = self._usual.get(path) or self.templates.applied(raw, path)
-            self._usual[path] = whole
-        if path in self._report.broken:
-            self._report.broken.add((section, name))
-        try:
-            node = self._owners.get(values["robot"])
-            filled = self._filling.entry(whole, values, node)
-            return filled if own is None else merged(filled, self._filling.entry(own, values, node))
-        except BadSign as sign:
-            self._report.add_value(sign.place, path, sign.bad)
-            self._report.stop()
-
-    def _eaches_of(self, name: str, section: Fields) -> dict[str, _Made]:
-        """Return what a section makes for robots, by name."""
-        if name not in self._for_robots:
-            found: dict[str, _Made] = {}
-            for key, entry in section.values.items():
-                if isinstance(entry, Fields) and EACH in entry.values:
-                    self._make(name, key, entry, section.keys[key], found)
-            self._for_robots[name] = found
-        return self._for_robots[name]
-
-    def _make(self, name: str, key: str, entry: Fields, place: Place, found: dict[str, _Made]) -> None:
-        """Add what one entry makes. It is not known who there is where that is wrong, so then it is the end."""
-        problems, path, node = len(self._report.problems), (name, key), entry.values[EACH]
-        text = plain(node)
-        if not isinstance(text, str):
-            self._report.add(node.place, (*path, EACH), "not a selector", text)
-        elif self._population.names and "$" not in key:
-            what = "the name of what is made for each robot has $robot or $1 in it"
-            self._report.add(place, path, what, key, repr(f"{key}-{'$1' if is_several(text) else '$robot'}"))
-        elif self._population.names:
-            each = Each(path, without(entry, EACH))
-            for robot, parts in self._chosen(text, node.place, (*path, EACH)):
-                if not self._add(each, each.values(robot, parts), place, found):
-                    break
-        if len(self._report.problems) > problems:
-            self._report.stop()
-
-    def _add(self, each: Each, values: dict[str, str], place: Place, found: dict[str, _Made]) -> bool:
-        """Add what is made for one robot; return whether its name is acceptable."""
-        section, key = each.path
-        try:
-            name = put(key, place, values)
-        except BadSign as sign:
-            self._report.add_value(place, each.path, sign.bad)
-            return False
-        what = ""
-        if name in found:
-            what = f"a name that is made twice, also by {found[name][0].path[1]}"
-        elif len(name) > limits.NAME_LENGTH_MAX:
-            what = f"the name that it makes for {values['robot']} has more than {limits.NAME_LENGTH_MAX} characters"
-        elif len(found) == FOR_ROBOTS[section]:
-            what = f"with it there are more than {FOR_ROBOTS[section]} {section}"
-        if what:
-            self._report.add(place, each.path, what, name)
-        else:
-            found[name] = each, values
-        return not what
-
     def _with_robots(self, entry: Tree, path: tuple[str, str]) -> Tree:
         """Return a player with the names of all its robots."""
         robots = entry.values.get(ROBOTS) if isinstance(entry, Fields) else None
@@ -351,6 +331,14 @@ class Expansion:
         return Fields(entry.place, {**entry.values, ROBOTS: named}, entry.keys)
 
 
-def _keys(section: Fields, key: str) -> Mapping[str, Tree]:
+def _maker(section: Fields, key: str) -> tuple[str, Place, Place]:
+    """Return the key by which an entry makes others, its place and that of its value."""
     entry = section.values[key]
-    return entry.values if isinstance(entry, Fields) else {}
+    assert isinstance(entry, Fields), "it makes others"
+    by = next(one for one in (COUNT, EACH, SPARE) if one in entry.values)
+    return by, entry.keys[by], entry.values[by].place
+
+
+def _has_spares(entry: Fields) -> bool:
+    """Whether `spare` says how many."""
+    return SPARE in entry.values and not isinstance(plain(entry.values[SPARE]), bool)

@@ -11,10 +11,9 @@ from typing import Any, Final
 
 from foosim.common import limits
 from foosim.common.names import NAME_PATTERN, SELECTOR_LENGTH_MAX, SELECTOR_PATTERN
-from foosim.deployment.text.each import EACH
 from foosim.deployment.text.expand import ENTRIES, FLEETS, FOR_ROBOTS
-from foosim.deployment.text.fleets import AXES, COUNT, SPACING, SPARE
 from foosim.deployment.text.includes import INCLUDE
+from foosim.deployment.text.made import AXES, COUNT, EACH, SPACING, SPARE
 from foosim.deployment.text.templates import LIKE, PRESET, TEMPLATES
 
 Schema = dict[str, Any]

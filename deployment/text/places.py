@@ -15,9 +15,9 @@ from typing import Any, Final
 from foosim.common.errors import describe
 from foosim.common.finding import Finding, Location, with_written
 from foosim.deployment.text.expand import ENTRIES
-from foosim.deployment.text.fleets import AXES, SPACING
+from foosim.deployment.text.made import AXES, SPACING
 from foosim.deployment.text.templates import TEMPLATES
-from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree, plain_shared
+from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree, plain
 
 FINDINGS_MAX: Final = 2_000
 """Findings that are looked at, also of those that are the same problem: each may have thousands of names to compare."""
@@ -90,7 +90,7 @@ class Places:
 
     @cached_property
     def _data(self) -> Any:
-        return plain_shared(self._expanded)
+        return plain(self._expanded)
 
     @cached_property
     def _values(self) -> dict[Place, Location]:

@@ -2,7 +2,7 @@
 
 A range selects those of its names that there are; numbers are written as the first one is, with zeros before them or
 without. What the wildcards match, or the number of a range, is what `$1`, `$2`... stand for where an entry is made for
-each robot (each.py).
+each robot (made.py).
 """
 
 from __future__ import annotations

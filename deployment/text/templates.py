@@ -58,7 +58,7 @@ class Templates:
         self._keys: dict[str, Place] = {}
         self._refused: set[str] = set()
         self._whole: dict[str, Fields | None] = {}
-        self._sections: dict[str, set[str]] = {}
+        self._used: set[str] = set()
         self._reported: set[Place] = set()
         section = tree.values.get(TEMPLATES)
         if isinstance(section, Fields):
@@ -101,7 +101,6 @@ class Templates:
         if template is None:
             self._report.broken.add(path)
             return own
-        self._use(like, path[0])
         return merged(template, own)
 
     def whole(self, name: str, chain: tuple[str, ...] = ()) -> Fields | None:
@@ -131,28 +130,16 @@ class Templates:
         elif len(chain) >= limits.LIKE_DEPTH_MAX:
             what = f"more than {limits.LIKE_DEPTH_MAX} templates that are like one another"
         else:
+            self._used.add(name)
             return self.whole(name, chain)
         if like.place not in self._reported:  # by another entry of a fleet
             self._reported.add(like.place)
             self._report.add(like.place, path, what, name, nearest)
         return None
 
-    def _use(self, like: Tree, section: str) -> None:
-        """Note that an entry of a section is like a template, and with it like those that this is like."""
-        while isinstance(like, Leaf) and isinstance(like.value, str) and like.value in self._written:
-            known = self._sections.setdefault(like.value, set())
-            if section in known:
-                return
-            known.add(section)
-            next_like = self._written[like.value].values.get(LIKE)
-            if next_like is None:
-                return
-            like = next_like
-
     def unused(self) -> dict[str, tuple[Fields, Place]]:
-        """Return the whole templates that no entry is like, each with the place of its name."""
-        left = [name for name in self._written if name not in self._sections]
-        found = {name: (self.whole(name), self._keys[name]) for name in left}
+        """Return the whole templates that nothing is like, each with the place of its name."""
+        found = {name: (self.whole(name), self._keys[name]) for name in self._written if name not in self._used}
         return {name: (whole, place) for name, (whole, place) in found.items() if whole is not None}
 
 

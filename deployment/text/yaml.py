@@ -6,11 +6,11 @@ are reported together. No object is constructed by PyYAML. Scalars have the valu
 and `12:30:45` are text, `1e5` is a number. Keys are always text.
 """
 
+import json
 import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any, Final
 
 import yaml
@@ -21,10 +21,8 @@ from foosim.common.errors import describe
 DEPTH_MAX: Final = 16
 NODES_MAX: Final = 20_000
 NUMBER_LENGTH_MAX: Final = 40
-KEY_LENGTH_MAX: Final = 100
-"""Longer keys are written in another form."""
-TEXTS_KEPT: Final = 2_048
-"""Texts of which it is known how they are written."""
+KEY_LENGTH_MAX: Final = 512
+"""Longer keys are written behind a question mark: readers look for a colon within 1,024 characters."""
 SETS_RANK: Final = 1_000
 """The rank of places in settings of a command line: files are before it."""
 
@@ -33,9 +31,9 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 _NULL = re.compile(r"null|Null|NULL|~|")
 _BOOL = re.compile(r"true|True|TRUE|false|False|FALSE")
-_SIMPLE = re.compile(r"[ -~]+")
-# Names with a dash or a dot, and quantities: no version of YAML reads them as anything but text.
-_USUAL = re.compile(r"[a-z][a-z0-9_]*[-.][a-z0-9_.-]*[a-z0-9]|-?[0-9]+(?:\.[0-9]+)? [A-Za-z%][A-Za-z0-9%/]*")
+# Names, paths, selectors and quantities, which no version of YAML reads as anything but text, but for some words.
+_PLAIN = re.compile(r"[A-Za-z_](?:[\w./*?:%-]*[\w/*?%-])?|-?[0-9]+(?:\.[0-9]+)? [A-Za-z%][A-Za-z0-9%/]*", re.ASCII)
+_WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null"))
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -254,16 +252,7 @@ def _integer(text: str) -> int:
 
 
 def plain(tree: Tree) -> Any:
-    """Return the tree as new dicts, lists and scalars."""
-    if isinstance(tree, Leaf):
-        return tree.value
-    if isinstance(tree, Items):
-        return [plain(item) for item in tree.items]
-    return {key: plain(value) for key, value in tree.values.items()}
-
-
-def plain_shared(tree: Tree) -> Any:
-    """Return the tree as dicts, lists and scalars, of which nobody changes any: a node that is met again is one value.
+    """Return the tree as new dicts, lists and scalars; a node that is met again is one value.
 
     The entries of an expanded tree share what they have from a template.
     """
@@ -311,42 +300,27 @@ def measure(tree: Tree, known: dict[int, tuple[int, int]] | None = None) -> tupl
     return size
 
 
-class _Dumper(yaml.SafeDumper):
-    """Quotes the scalars that YAML 1.2 or YAML 1.1 would read as another value."""
-
-
-for _tag, _pattern, _first in (
-    ("null", _NULL, ["~", "n", "N", ""]),
-    ("bool", _BOOL, list("tTfF")),
-    ("int", _INT, list("-+0123456789")),
-    ("float", re.compile(f"{_FLOAT.pattern}|{_NOT_FINITE.pattern}"), list("-+.0123456789")),
-):
-    _Dumper.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(f"(?:{_pattern.pattern})$"), _first)
-
-
 def write_yaml(data: Any) -> str:
-    """Return plain data as block style YAML, in its order, without comments; `read_tree` reads the same data back."""
-    try:
-        return "".join(_lines(data, "", "")) if isinstance(data, dict | list) and data else _dump(data)
-    except _NotSimple:
-        return _dump(data)
+    """Return plain data as block style YAML, in its order, without comments; `read_tree` reads the same data back.
 
-
-class _NotSimple(Exception):
-    """A text whose form depends on what it is in."""
+    PyYAML would take ten times as long: a second for some thousand robots. Texts that some version of YAML may read as
+    anything else are in double quotes.
+    """
+    return "".join(_lines(data, "", "")) if isinstance(data, dict | list) and data else f"{_scalar(data)}\n"
 
 
 def _lines(data: dict[Any, Any] | list[Any], first: str, indent: str) -> Iterator[str]:
-    """Yield the lines that PyYAML writes, in a tenth of its time: it takes a second for some thousand robots.
-
-    The collection is not empty. `first` is what its first line begins with, `indent` what the others do.
-    """
+    """Yield the lines of a collection that is not empty. `first` is what its first line begins with, `indent` what the
+    others do."""
     entries = enumerate(data) if isinstance(data, list) else data.items()
     for key, value in entries:
-        begin = f"{first}-" if isinstance(data, list) else f"{first}{_text_of(key, KEY_LENGTH_MAX)}:"
+        begin = f"{first}-" if isinstance(data, list) else f"{first}{_scalar(key)}:"
+        if len(begin) > KEY_LENGTH_MAX:
+            yield f"{first}? {_scalar(key)}\n"
+            begin = f"{indent}:"
         first = indent
         if not (isinstance(value, dict | list) and value):
-            yield f"{begin} {_text_of(value)}\n"
+            yield f"{begin} {_scalar(value)}\n"
         elif isinstance(data, list):
             yield from _lines(value, f"{begin} ", f"{indent}  ")
         else:
@@ -355,23 +329,12 @@ def _lines(data: dict[Any, Any] | list[Any], first: str, indent: str) -> Iterato
             yield from _lines(value, inner, inner)
 
 
-def _text_of(value: Any, length_max: int = limits.DEPLOYMENT_BYTES_MAX) -> str:
-    """Return a scalar or an empty collection as PyYAML writes it."""
-    if not isinstance(value, str):
-        return _dump([value])[2:-1]
-    if len(value) > length_max or not _SIMPLE.fullmatch(value):
-        raise _NotSimple
-    return value if _USUAL.fullmatch(value) else _scalar(value)
-
-
-@lru_cache(maxsize=TEXTS_KEPT)
-def _scalar(text: str) -> str:
-    return _dump([text])[2:-1]
-
-
-def _dump(data: Any) -> str:
-    text = yaml.dump(
-        data, Dumper=_Dumper, default_flow_style=False, sort_keys=False, allow_unicode=True, width=1_000_000
-    )
-    assert isinstance(text, str)
-    return text
+def _scalar(value: Any) -> str:
+    """Return a scalar or an empty collection as it is written."""
+    if isinstance(value, float):
+        text = repr(value)
+        return text if "." in text else text.replace("e", ".0e")  # a text in YAML 1.1 without a point
+    if isinstance(value, str) and _PLAIN.fullmatch(value) and value.lower() not in _WORDS:
+        return value
+    text = json.dumps(value, ensure_ascii=False)
+    return text if text.isprintable() else "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in text)

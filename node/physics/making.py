@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import AnyEngine, EngineKind
-from foosim.world.forms import registry
 from foosim.world.layout import Entity, Layout
 
 
 def kind_of(deployment: Deployment) -> EngineKind:
     """Return the registered engine that a deployment names."""
-    kind: EngineKind = registry.find("engine", deployment.engine).made()
+    kind: EngineKind = deployment.engine_type.made()
     return kind
 
 

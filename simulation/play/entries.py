@@ -41,7 +41,6 @@ from foosim.protocol.replay_messages import (
     PlayedScene,
 )
 from foosim.vhub.network.packet import DELIVERED
-from foosim.world.layout import kits_named
 
 TOPICS: Final = (*ROW_TYPES, *VIEW_TYPES)
 """The topics that can be played."""
@@ -97,7 +96,7 @@ def make_selection(deployment: Deployment, topics: Sequence[str] = (), remaps: S
 
 def _renamed(deployment: Deployment, remaps: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Return new names of endpoints and bodies, and of channels."""
-    bodies = {name for kit in kits_named(deployment) for name in kit.entities}
+    bodies = {name for kit in deployment.kit_types.values() for name in kit.entities}
     known = {*deployment.robots, *deployment.players, *deployment.clients, *bodies}
     names: dict[str, str] = {}
     channels: dict[str, str] = {}

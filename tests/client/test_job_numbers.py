@@ -19,6 +19,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.world.actuators.go_to import Place
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 from foosim.world.sensors.job import Jobs as Reading
 from tests.kinematic_yard import yard_text
 
@@ -175,4 +176,4 @@ def test_what_learns_gives_plain_commands() -> None:
     vector = CommandVector(DEPLOYMENT, ["scout"])
     assert [column.field for column in vector.columns] == ["x", "y"]
     (packet,) = vector.packets(np.array([1.0, 2.0]))
-    assert codec_of("go_to", "actuator").decode(packet.payload) == Place(1.0, 2.0)
+    assert codec_of(find_component("actuator", "go_to")).decode(packet.payload) == Place(1.0, 2.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from foosim.common.errors import DeploymentError
-from foosim.deployment.loader import Text, apply_sets, load_deployment
+from foosim.deployment.loader import Text, apply_sets
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 
 WAREHOUSE = Path(__file__).parents[2] / "deploy" / "warehouse.yaml"
@@ -38,25 +38,34 @@ BATTERY = "{kind: battery, rate: 1 Hz, offset: 0 s}"
 ALL_ON_ONE = "nodes: {one: {robots: ['*']}}\n"
 PATROL = "foosim.players.warehouse_rover:Patrol"
 
+ROVER = f"""\
+templates:
+  rover:
+    model: rover
+    sensors:
+      pose: {POSE}
+      battery: {BATTERY}
+"""
+PILOT = f"  pilot: {{class: '{PATROL}', rate: 10 Hz, on: $robot, robots: {{$robot: [pose]}}}}\n"
+TWO = "robots: {r-1: {like: rover, x: 1 m, y: 2 m}, r-2: {like: rover, x: 3 m, y: 2 m}}\n"
+FLEET = ROVER + "robots:\n  rover: {like: rover, count: 12, x: -15 m, y: 10 m, spacing: {x: 1.25 m, y: -50 cm}}\n"
+
 
 def hall(rest: str, *, head: str = HEAD) -> str:
     """Return the text of a hall; robots are on one node unless `rest` has nodes."""
     return head + rest + ("" if "\nnodes:" in f"\n{rest}" else ALL_ON_ONE)
 
 
-def long_robot(x: str, y: str, **more: object) -> dict[str, object]:
-    """Return a rover that is written out, with a pose and a battery."""
-    sensors = {
-        "pose": {"kind": "pose", "rate": "5 Hz", "offset": "0 s"},
-        "battery": {"kind": "battery", "rate": "1 Hz", "offset": "0 s"},
-    }
-    return {"model": "rover", "x": x, "y": y, "sensors": sensors, **more}
-
-
-def same(short: str, robots: dict[str, object], **sections: object) -> None:
-    """Assert that a hall is the same as one whose robots and other sections are written out."""
-    written = "".join(f"{name}: {json.dumps(value)}\n" for name, value in {"robots": robots, **sections}.items())
-    assert load_deployment(hall(short), "short").model_dump() == load_deployment(hall(written), "long").model_dump()
+MADE = hall(
+    ROVER
+    + PILOT.replace("robots:", "hears: {'p*': [beacon, more]}, robots:")
+    + "  heavy: {like: rover, charge: 50 %}\n"
+    + "robots:\n  r: {like: rover, count: 9, x: -9 m, y: 2 m, spacing: {x: 2 m}}\n"
+    + "  red.one: {like: heavy, x: 0 m, y: 4 m}\n"
+    + "players: {p$1: {like: pilot, each: r-*}, q-$1: {like: pilot, each: red.*}}\n"
+    + "clients: {c$1: {each: r-*, on: $robot}}\n"
+)
+"""A fleet with players and clients, and a robot beside it."""
 
 
 def problems_of(text: Text, sets: Sequence[str] = (), name: str = "f") -> list[str]:
@@ -64,9 +73,10 @@ def problems_of(text: Text, sets: Sequence[str] = (), name: str = "f") -> list[s
     with pytest.raises(DeploymentError) as error:
         apply_sets(text, name, sets)
     assert str(error.value) == "\n".join(error.value.problems)
-    return [_behind_head(line, name) for line in error.value.problems]
+    return [behind_head(line, name) for line in error.value.problems]
 
 
-def _behind_head(line: str, name: str) -> str:
+def behind_head(line: str, name: str) -> str:
+    """Return a line of a report on a file of this name, its place counted from behind the head of a hall."""
     file, number, rest = f"{line}::".split(":", 2)
     return f"{int(number) - HEAD_LINES}:{rest}".removesuffix("::") if file == name else line

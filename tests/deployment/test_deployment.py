@@ -12,10 +12,9 @@ from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
 from foosim.common.units import Pace
-from foosim.deployment.checks import DEPLOYMENT_KEYS
 from foosim.deployment.components import read_components
 from foosim.deployment.json_schema import deployment_schema_text
-from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.loader import DEPLOYMENT_KEYS, apply_sets, expanded_text, load_deployment, read_deployment
 from foosim.deployment.network.impairments import GammaJitter
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
@@ -23,7 +22,8 @@ from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.launcher.liveness import WAITS_S
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.world.forms.per_field import numbers_of, read_per_field
-from foosim.world.forms.registry import find_component
+from foosim.world.forms.registry import find, find_component, find_model
+from foosim.world.forms.settings import ComponentSettings
 from foosim.world.models.camera import CameraRobot
 from foosim.world.models.rod import RodRobot
 from foosim.world.modifiers.gaussian_noise import GaussianNoiseSettings
@@ -31,6 +31,7 @@ from foosim.world.parameters.table import LINE_NAMES, TEAMS, table_of
 from foosim.world.sensors.ball import BallSettings
 from foosim.world.sensors.encoder import EncoderSettings
 from tests.deployment.halls import BATTERY, PATROL, POSE, hall
+from tests.turns import BY_PERIOD
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
@@ -154,11 +155,43 @@ def test_a_rule_without_effects_is_a_perfect_link() -> None:
     assert (rule.delay_ns, rule.jitter, rule.loss, rule.order) == (0, None, 0.0, "fifo")
 
 
-def test_a_deployment_written_in_si_units_is_the_same_deployment(table: Deployment) -> None:
-    written = table.model_dump(mode="json", by_alias=True)
+DEPLOYMENTS = ("table.yaml", "table_sensors.yaml", "warehouse.yaml", "yard.yaml")
+
+
+@pytest.mark.parametrize("name", DEPLOYMENTS)
+@pytest.mark.parametrize("sets", [(), ("seed=5", "network.defaults={in_flight_on_partition: deliver}", "pace=fast")])
+def test_all_texts_of_a_deployment_are_the_same_deployment(name: str, sets: tuple[str, ...]) -> None:
+    """The canonical one, which keeps what is abbreviated, the expanded one, and that in SI units."""
+    text = (DEPLOY / name).read_text()
+    canonical, expanded = apply_sets(text, name, sets), expanded_text(text, name, sets)
+    assert apply_sets(canonical, "c", []) == canonical and "#" not in canonical
+    assert canonical.count("like:") == sum("like:" in line.partition("#")[0] for line in text.splitlines())
+    assert not any(sign in expanded for sign in ("templates", "like", "$", "count:"))
+    kept = load_deployment(canonical, name)
+    assert kept is load_deployment(canonical, name)
+    written = kept.model_dump(mode="json", by_alias=True, exclude_unset=True)
     data, findings = read_components(written | written.pop("kits"), DEPLOYMENT_KEYS)
     assert findings == []
-    assert Deployment.model_validate(data) == table
+    for other in (read_deployment(canonical, name), load_deployment(expanded, "e")):
+        assert kept == other and repr(kept) == repr(other)
+    assert Deployment.model_validate(data).model_dump() == kept.model_dump()
+    assert load_deployment(text, name).seed == 1, "settings change no other text"
+
+
+@pytest.mark.parametrize("name", DEPLOYMENTS)
+def test_settings_know_their_component_type_and_so_do_copies(name: str) -> None:
+    loaded = load_deployment((DEPLOY / name).read_text(), name)
+    for one in (loaded, loaded.model_copy(update={"seed": 9})):
+        assert one.engine_type is find("engine", one.engine) and [*one.kit_types] == sorted(one.kits)
+        typed: list[tuple[str, ComponentSettings]] = [("rule", rule) for rule in one.world_rules.values()]
+        for robot in one.robots.values():
+            model = find_model(robot.model).variant(getattr(robot, "dynamics", None))
+            assert robot.model_copy(update={"spare": True}).component_type is robot.component_type is model
+            typed += [("entity_rule", rule) for rule in robot.rules.values()]
+            for form, components in (("sensor", robot.sensors), ("actuator", robot.actuators)):
+                typed += [(form, its) for its in components.values()]
+                typed += [("modifier", modifier) for its in components.values() for modifier in its.modifiers]
+        assert typed and all(its.component_type is find(form, its.kind) for form, its in typed)
 
 
 def test_values_do_not_change(table: Deployment) -> None:
@@ -276,3 +309,18 @@ def test_a_lost_supervisor_or_vhub_is_waited_for_as_long_as_a_start_takes(start_
     assert min(deadlines.orphan_ns, deadlines.vhub_back_ns, UNKNOWN_NS if start_s <= 60 else longest_ns) >= longest_ns
     given = load_deployment(apply_sets(TABLE_TEXT, "f", [*sets, "deadlines.orphan=5 s"]), "f").deadlines
     assert given.orphan_ns == 5 * 10**9 and given.vhub_back_ns == deadlines.vhub_back_ns
+
+
+def test_who_is_on_board_is_kept_and_clients_too() -> None:
+    sets = ("players.player-red.on=red.goal", "clients={laptop: {on: camera}}")
+    deployment = load_deployment(apply_sets(TABLE_TEXT, "table.yaml", sets), "table.yaml")
+    assert (deployment.players["player-red"].on, deployment.clients["laptop"].on) == ("red.goal", "camera")
+    assert deployment.players["player-blue"].on is None
+
+
+def test_a_selector_over_robots_takes_those_that_have_the_channel() -> None:
+    sets = (*BY_PERIOD, "players.player-red.hears={'*': [encoder, beacon]}", "players.player-red.robots={}")
+    deployment = load_deployment(apply_sets(TABLE_TEXT, "table.yaml", sets), "table.yaml")
+    heard = deployment.heard_by("player-red")
+    assert ("camera", "encoder") not in heard and ("red.goal", "encoder") in heard
+    assert [pair for pair in heard if pair[1] == "beacon"] == [("player-blue", "beacon")]

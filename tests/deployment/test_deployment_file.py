@@ -1,12 +1,13 @@
 """Deployment files: every problem at once, each with its place, byte for byte, and nothing from outside gets through.
 
-The bad files are made from a small good one by replacing single lines: deployment_problems.txt has them with their
-reports.
+The bad files are made from good ones by other lines, more lines and settings: deployment_problems.txt has them with
+their reports.
 """
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,11 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_deployment_text
 from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
+from tests.apart import apart
+from tests.deployment.halls import FLEET, MADE, PILOT, ROVER, TWO, behind_head, hall
 
+HALLS = {"hall": "", "rover": ROVER, "pilots": ROVER + PILOT + TWO, "fleet": FLEET}
+"""What halls of that name begin with."""
 CASES = Path(__file__).with_name("deployment_problems.txt")
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 
@@ -112,47 +117,61 @@ def test_the_small_file_is_good() -> None:
     assert deployment.owners() == {"camera": "one", "red.goal": "one"}
 
 
-def cases() -> Iterator[tuple[str, list[str], list[tuple[int, str]], list[str]]]:
-    """Name, settings, replaced lines and report of each case in deployment_problems.txt."""
-    text = CASES.read_text().partition("\n\n")[2]
-    for block in text.strip("\n").split("\n\n"):
+@dataclass
+class Case:
+    """A case of deployment_problems.txt: how a text is made, and the lines of the report on it."""
+
+    base: str
+    sets: list[str]
+    replaced: list[tuple[int, str]]
+    added: str
+    problems: list[str]
+    written_out: str
+
+    @property
+    def found(self) -> list[str]:
+        """The problems that there are; in halls their places are counted from the first added or shared line."""
+        if self.base in ("made", *HALLS):
+            text = MADE if self.base == "made" else hall(HALLS[self.base] + self.added)
+            return [behind_head(line, "f") for line in problems_with(text, "f", self.sets)]
+        if self.base == "small" and not self.sets:
+            found = problems_with(changed(*self.replaced), "small.yaml", ())
+            return [problem.removeprefix("small.yaml:") for problem in found]
+        return problems_with(apart() if self.base == "apart" else TABLE_TEXT, "table.yaml", self.sets)
+
+
+def problems_with(text: str, name: str, sets: Sequence[str]) -> list[str]:
+    """The lines of the report on a text with settings; none for a good one."""
+    try:
+        load_deployment(apply_sets(text, name, sets) if sets else text, name)
+    except DeploymentError as error:
+        assert str(error) == "\n".join(error.problems)
+        return list(error.problems)
+    return []
+
+
+def cases() -> Iterator[Case]:
+    """The cases of deployment_problems.txt."""
+    for block in CASES.read_text().partition("\n\n")[2].strip("\n").split("\n\n"):
         lines = block.split("\n")
-        problems = [line.removeprefix("> ") for line in lines if line.startswith("> ")]
-        sets = [line.removeprefix("--set ") for line in lines if line.startswith("--set ")]
+        marks = ("> ", "+ ", "= ", "--set ", "@")
+        marked = {mark: [line[len(mark) :] for line in lines if line.startswith(mark)] for mark in marks}
         replaced: dict[int, list[str]] = {}
         for match in filter(None, (re.fullmatch(r"([0-9]+)\|(?: (.*))?", line) for line in lines)):
             replaced.setdefault(int(match[1]), []).append(match[2] or "")
-        assert len(lines) == len(problems) + len(sets) + sum(map(len, replaced.values())), block
-        yield lines[0], sets, [(number, "\n".join(texts)) for number, texts in replaced.items()], problems
+        base = marked["@"][0] if marked["@"] else "small"
+        assert len(lines) == sum(map(len, (*marked.values(), *replaced.values()))), block
+        others = [(number, "\n".join(texts)) for number, texts in replaced.items()]
+        added, out = ("".join(f"{line}\n" for line in marked[mark]) for mark in ("+ ", "= "))
+        yield Case(base, marked["--set "], others, added, marked["> "], out)
 
 
-@pytest.mark.parametrize(("name", "sets", "lines", "problems"), list(cases()))
-def test_each_problem_is_one_line_with_its_place(
-    name: str, sets: list[str], lines: list[tuple[int, str]], problems: list[str]
-) -> None:
-    found: tuple[str, ...] = ()
-    try:
-        if sets:
-            apply_sets(TABLE_TEXT, "table.yaml", sets)
-        else:
-            load_deployment(changed(*lines), "small.yaml")
-    except DeploymentError as error:
-        assert str(error) == "\n".join(error.problems)
-        found = error.problems
-    assert [problem.removeprefix("small.yaml:") for problem in found] == problems
-
-
-def set_problems(*sets: str) -> list[str]:
-    """The problems that settings make in table.yaml."""
-    with pytest.raises(DeploymentError) as error:
-        apply_sets(TABLE_TEXT, "table.yaml", sets)
-    return list(error.value.problems)
-
-
-def test_a_line_that_a_rod_stands_on_must_exist() -> None:
-    problems = set_problems("table.lines={}")
-    assert len(problems) == 8
-    assert problems[0].endswith("robots.red.goal.line: not in table.lines, 'goal'")
+@pytest.mark.parametrize("case", list(cases()), ids=lambda case: (case.sets or [case.added or case.base])[0][:60])
+def test_each_problem_is_one_line_with_its_place(case: Case) -> None:
+    assert case.found == case.problems
+    if case.written_out:
+        short, long = hall(HALLS[case.base] + case.added), hall(case.written_out)
+        assert load_deployment(short, "short").model_dump() == load_deployment(long, "long").model_dump()
 
 
 def test_all_problems_of_fields_come_at_once_in_the_files_order_then_all_between_them() -> None:
@@ -196,7 +215,8 @@ def test_the_report_of_a_hostile_file_is_bounded() -> None:
     assert keys[-1] == f"and more: only the first {PROBLEMS_MAX} problems are shown"
     robots = "".join(f"  a{number}: {{model: camera, sensors: {{}}}}\n" for number in range(600))
     names = ",".join(f"b{number}" for number in range(4000))
-    assert len(problems_of(f"robots:\n{robots}nodes: {{n: {{robots: [{names}]}}}}\n")) == PROBLEMS_MAX + 1
+    hostile = changed((10, f"{robots}  red.goal:"), (29, f"    robots: [{names}]"))
+    assert len(problems_of(hostile)) == PROBLEMS_MAX + 1
 
 
 def test_a_file_is_read_from_disk_within_its_bounds(tmp_path: Path) -> None:

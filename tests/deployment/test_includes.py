@@ -16,8 +16,7 @@ from foosim.deployment.text.files import read_source_file
 from foosim.deployment.text.includes import Source
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
-from tests.deployment.halls import HEAD, PATROL, hall
-from tests.deployment.test_templates import ROVER
+from tests.deployment.halls import HEAD, PATROL, ROVER, hall
 
 ROBOTS = "robots: {r: {like: rover, count: 3, x: 1 m, y: 2 m, spacing: {x: 2 m}}}\n"
 SHELF = "scenery:\n  shelf: {shape: box, length: 2 m, width: 1 m, height: 2 m, y: 8 m}\n"

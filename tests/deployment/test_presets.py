@@ -69,30 +69,6 @@ def test_the_canonical_text_keeps_the_name_and_the_expanded_one_has_all() -> Non
     assert "preset" not in expanded["table"] and expanded["table"]["ball"]["mass"] == "27 g"
 
 
-@pytest.mark.parametrize(
-    ("sets", "told"),
-    [
-        (
-            ["table={preset: uss}"],
-            ["--set:1:16: table.preset: unknown preset, valid are german, us, small, 'uss', nearest is 'us'"],
-        ),
-        (["table={preset: 3}"], ["--set:1:16: table.preset: unknown preset, valid are german, us, small, 3"]),
-        (
-            ["table={preset: us}", "table.feild.width=1 m"],
-            ["--set:2:7: table: unknown key, 'feild', nearest is 'field'"],
-        ),
-        (
-            ["table={preset: us, goal: {width: 700 mm}}"],
-            [
-                "--set:1:34: table.goal.width: not below table.field.width (679 mm), valid is below 679 mm, '700 mm'",
-            ],
-        ),
-    ],
-)
-def test_a_wrong_preset_is_refused_at_its_place(sets: list[str], told: list[str]) -> None:
-    assert problems(*sets) == told
-
-
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_ball_is_played_on_each(name: str) -> None:
     sets = [f"table={{preset: {name}}}", "table.rules.kickoff_delay=20 ms", "engine=bullet"]

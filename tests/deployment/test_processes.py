@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.common.errors import BadValue, DeploymentError
+from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import SHAPES, joint_processes, parse_shape, processes_of
 from foosim.deployment.schema import Deployment
@@ -78,41 +78,6 @@ def test_processes_that_connect_with_several_roles_have_an_identity() -> None:
     assert list(joint_processes(deployed(*sets))) == ["one-left"]
     sets = ("vhub.process=hub", "nodes.red.process=hub", "supervisor.process=main", "nodes.blue.process=main")
     assert list(joint_processes(deployed(*sets))) == ["hub"], "the supervisor's connects to none"
-
-
-@pytest.mark.parametrize(
-    ("sets", "problem"),
-    [
-        (("nodes.red.process=vhub",), "nodes.red.process: a reserved name"),
-        (("nodes.red.process=player-red",), "nodes.red.process: a name that is also one of players"),
-        (("vhub.process=red",), "vhub.process: a name that is also one of nodes"),
-        (
-            (
-                "hosts.left={address: 10.0.0.2}",
-                "nodes.red.host=left",
-                "nodes.red.process=main",
-                "supervisor.process=main",
-            ),
-            "nodes.red.process: a process whose roles are not all on the same host",
-        ),
-        (
-            ("supervisor.process=main", "players.player-red.process=main"),
-            "players.player-red.process: a player shares the supervisor's process only together with the vHub",
-        ),
-        (
-            ("nodes.red.launch=manual", "nodes.red.process=main"),
-            "nodes.red.process: a process for a node with `launch: manual`, which has its own",
-        ),
-        (
-            ("players.player-red.launch=manual", "players.player-red.process=main"),
-            "players.player-red.process: a process for a player with `launch: manual`, which has its own",
-        ),
-    ],
-)
-def test_what_cannot_share_is_refused_with_its_place(sets: tuple[str, ...], problem: str) -> None:
-    with pytest.raises(DeploymentError) as refused:
-        deployed(*sets)
-    assert problem in str(refused.value)
 
 
 def test_a_player_that_a_person_starts_has_a_process_of_its_own_in_each_shape() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import permutations
 from typing import Final
 
@@ -10,15 +11,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from foosim.common.errors import DeploymentError
-from foosim.deployment.event_requests import BadEvent, event_text
 from foosim.deployment.loader import apply_sets, load_deployment, load_network
 from foosim.deployment.network.link_settings import Profiles
-from foosim.deployment.network.presets import PRESETS
 from foosim.deployment.network.radios import lora_longest
 from foosim.deployment.network.rules import Network
-from foosim.deployment.radio_checks import rule_findings, unheeded
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
+from foosim.deployment.validate_network import BadEvent, event_text, rule_findings, unheeded
+from tests.deployment.test_deployment_file import cases
 from tests.links.offered import TABLE, deployment_of
 
 EVERYBODY: Final = ("network.robots={'*': [r]}", "network.places={'*': [0 m, 0 m, 1 m]}")
@@ -30,43 +30,17 @@ def refusal(*sets: str) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("radio", "problem"),
-    [
-        ("preset: wifi_5_indoor, rate: 1 Mbit/s",
-         "rate: has no effect over wifi: a radio's bit rate is its own: write `rates: fixed` and `fixed_rate` there"),
-        ("preset: zigbee, rate: 20 kbit/s", "rate: has no effect over ieee802154: a radio's bit rate is 250 kbit/s"),
-        ("preset: lora_eu868, rate: 20 bit/s", "over lora: a radio's bit rate is that of its `spreading_factor`"),
-        ("preset: wired_1g, medium: lte", "over lte: a radio's bit rate is that of its signal and `bandwidth`"),
-        ("preset: lte, trace: {file: t.mahi}", "trace: has no effect over lte"),
-        ("preset: acoustic, trace: {file: t.mahi}", "trace: has no effect over radio: write `rate`, a mapping of 1"),
-        ("preset: wifi_5_indoor, overhead: 1000 B", "overhead: has no effect over wifi, whose headers count already"),
-        ("preset: wifi_5_indoor, fixed_rate: 6 Mbit/s", "fixed_rate: has no effect without `rates: fixed`"),
-        ("preset: zigbee, fixed_rate: 6 Mbit/s", "fixed_rate: has no effect on ieee802154, it is of wifi"),
-        ("preset: wifi_5_indoor, spreading_factor: 9", "spreading_factor: has no effect on wifi, it is of lora"),
-        ("preset: wifi_5_indoor, bandwidth: 80 MHz",
-         "bandwidth: not a bandwidth of 802.11a/g here, which has 20 MHz or 10 MHz, '80 MHz', nearest is '20 MHz'"),
-        ("preset: wifi_5_indoor, duty_cycle: 1 %",
-         "not to be had on wifi, whose airtime is not known before it is used; lora has it, and radio, '1 %'"),
-        ("preset: range_only, duty_cycle: 1 %", "duty_cycle: has no effect without `rate`: packets take no time"),
-        ("preset: lora_eu868, spreading_factor: 9, mtu: 116 B",
-         "mtu: more than the 115 B of LoRaWAN at spreading factor 9, '116 B'"),
-    ],
-)  # fmt: skip
-def test_a_radio_is_not_asked_for_what_it_does_not_do(radio: str, problem: str) -> None:
-    assert problem in refusal(f"network.radios={{r: {{{radio}}}}}")
-    with pytest.raises(DeploymentError, match=r"radios\.r"):
-        load_network(f"network: {{radios: {{r: {{{radio}}}}}}}", "t")
-
-
-@pytest.mark.parametrize(
-    "radio",
-    [*(f"preset: {preset}" for preset in PRESETS), "preset: wifi_5_indoor, rates: fixed, fixed_rate: 12 Mbit/s",
-     "preset: dot11p, rates: ideal", "preset: wifi_5_indoor, bandwidth: 10 MHz", "preset: lte, overhead: 40 B",
-     "preset: acoustic, duty_cycle: 1 %, rate: 1 kbit/s", "preset: lora_eu868, spreading_factor: 9, mtu: 115 B"],
-)  # fmt: skip
-def test_a_radio_is_asked_for_what_it_does(radio: str) -> None:
-    deployment_of(f"network.radios={{r: {{{radio}}}}}")
+def test_a_network_by_itself_has_the_problems_of_its_radios() -> None:
+    """As they are of a whole deployment, in the table of problems."""
+    one = re.compile(r"network\.radios=(\{.*\})")
+    radios = [(found[1], case) for case in cases() if len(case.sets) == 1 and (found := one.fullmatch(case.sets[0]))]
+    assert len(radios) > 20
+    for text, case in radios:
+        if case.problems:
+            with pytest.raises(DeploymentError, match=r"radios\.r"):
+                load_network(f"network: {{radios: {text}}}", "t")
+        else:
+            assert load_network(f"network: {{radios: {text}}}", "t") is not None
 
 
 def test_the_payloads_of_lora_are_as_long_as_its_spreading_factor_lets_them() -> None:
@@ -112,29 +86,6 @@ def test_a_rule_whose_packets_go_by_a_wire_has_a_rate() -> None:
 
 
 # --- who is on air is somewhere ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("sets", "problem"),
-    [
-        (("network.radios={r: {preset: wifi_5_indoor}}", "network.links=[{id: l, from: a, to: b, via: r}]"),
-         "network.links[0].via: goes by radio to or from a, which is nowhere: write network.places.a or its `on`, 'r'"),
-        (("network.radios={r: {preset: wifi_5_indoor}}", "network.links=[{id: l, from: a, to: b, via: r}]",
-          "network.robots={a: [r]}", "network.places={a: [0 m, 0 m, 1 m]}"), "network.places.b"),
-        (("network.defaults={preset: zigbee}",),
-         "network.defaults.preset: goes by radio to or from a, which is nowhere: write network.places.a"),
-    ],
-)  # fmt: skip
-def test_who_goes_by_radio_has_a_place(sets: tuple[str, ...], problem: str) -> None:
-    assert problem in refusal(*sets)
-    deployment_of(*sets, "network.places={'*': [0 m, 0 m, 1 m]}")
-
-
-def test_who_never_meets_a_radio_needs_no_place() -> None:
-    """A rule before takes all of its packets."""
-    before = "{id: wire, between: ['?', '*'], delay: 1 ms}, {id: seen, between: [camera, '*'], delay: 2 ms}"
-    behind = "{id: l, from: '*', to: '*', via: r}"
-    deployment_of("network.radios={r: {preset: wifi_5_indoor}}", f"network.links=[{before}, {behind}]")
 
 
 def test_the_links_of_the_console_are_ideal_and_need_no_radio_where_no_rule_names_it() -> None:

@@ -21,6 +21,7 @@ from foosim.simulation.system import Settings
 from foosim.simulation.verify import verify_capture
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 from foosim.world.frame import Frame
 from tests.heads import folder, head
 from tests.kinematic_yard import yard_text
@@ -210,7 +211,7 @@ def test_a_late_repeat_sends_nobody_back(tmp_path: Path) -> None:
     for row, name in enumerate(PLAYERS):
         mine = packets.where((packets.source == name) & (packets.fate == "delivered"))
         for robot, payload, tick in zip(mine.destination, mine.payload, mine.arrival_tick, strict=True):
-            job = codec_of(KINDS[robot], "actuator").decode(payload).job
+            job = codec_of(find_component("actuator", KINDS[robot])).decode(payload).job
             frame = ran().frames[tick - ran().frames[0].tick]
             late += 0 < job < known(frame, robot)[row][0]
     assert late > 20

@@ -25,6 +25,7 @@ from foosim.world.actuators.joints.joint_trajectory import JointTrajectory, Traj
 from foosim.world.components.fitted import actuators_of
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 from foosim.world.layout import build_layout
 from foosim.world.moving.spline import fastest, position_at
 from tests.forms.worlds import DEPLOY
@@ -70,12 +71,12 @@ def its() -> Any:
 def tell(its: Simulation, robot: str, command: Any, ticks: int) -> JobState:
     """Send a command and compute some ticks; return how the last job stands."""
     kind = its.declared.robots[robot].actuators["go"].kind
-    its.advance({"ann": [Packet(robot, "go", codec_of(kind, "actuator").encode(command))]}, ticks)
+    its.advance({"ann": [Packet(robot, "go", codec_of(find_component("actuator", kind)).encode(command))]}, ticks)
     return JobState(int(its.frame.at(robot, "go.jobs_states")))
 
 
 def value(kind: str, *values: Any) -> Any:
-    return codec_of(kind, "actuator").kind(*values)
+    return codec_of(find_component("actuator", kind)).kind(*values)
 
 
 # --- the way ---------------------------------------------------------------------------------------------------------

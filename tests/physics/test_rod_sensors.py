@@ -15,6 +15,7 @@ from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 from foosim.world.models.rod import figure_ys
 from tests.physics.test_rod_drives import SEED, STILL, TABLE, TEXT, Driven
 from tests.placing import place_ball
@@ -30,7 +31,7 @@ def read(one: Driven, channel: str, robot: str | None = None) -> Any:
     (fitted,) = [sensor for sensor in sensors_of(one.deployment, one.layout, entity) if sensor.channel == channel]
     kind = one.deployment.robots[entity.name].sensors[channel].kind
     (payload,) = Sensing().sample([fitted], SensingView(one.tick, one.numbers))
-    return None if payload is None else codec_of(kind, "sensor").decode(payload)
+    return None if payload is None else codec_of(find_component("sensor", kind)).decode(payload)
 
 
 def is_due(one: Driven, channel: str) -> bool:

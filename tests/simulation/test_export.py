@@ -24,13 +24,14 @@ from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.actuators.rod_position import Command
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 from tests.own_forms import folder_on_path, written
 from tests.simulation.conftest import TABLE, TICK_NS, damaged, messages_of, replay, rewritten, with_row
 
 KINDS: Final = {
-    "ball": ("ball", "sensor"),
-    "encoder": ("encoder", "sensor"),
-    "position": ("rod_position", "actuator"),
+    "ball": ("sensor", "ball"),
+    "encoder": ("sensor", "encoder"),
+    "position": ("actuator", "rod_position"),
 }
 """What the table's channels carry."""
 
@@ -52,7 +53,7 @@ def test_packets_read_back_as_csv_are_those_of_the_capture(run: Path, tmp_path: 
     assert [bytes.fromhex(line["payload"]) for line in lines] == packets.payload.tolist()
     for line in lines:
         value = msgspec.json.decode(line["value"])
-        codec = codec_of(*KINDS[line["channel"]])
+        codec = codec_of(find_component(*KINDS[line["channel"]]))
         decoded = codec.decode(bytes.fromhex(line["payload"]))
         assert list(value.values()) == codec.numbers(decoded) and tuple(value) == codec.names
 
@@ -63,7 +64,7 @@ def test_commands_have_their_numbers(run: Path, tmp_path: Path) -> None:
     commands = packets.where(packets.channel == "position")
     lines = lines_of(tmp_path / "commands.csv")
     assert 100 < len(lines) == len(commands) < len(packets)
-    numbers = [codec_of(*KINDS["position"]).decode(payload) for payload in commands.payload]
+    numbers = [codec_of(find_component(*KINDS["position"])).decode(payload) for payload in commands.payload]
     assert [Command(float(line["slide"]), float(line["spin"])) for line in lines] == numbers
     assert [int(line["due_ns"]) for line in lines] == commands.due_ns.tolist()
     assert "payload" not in lines[0]
@@ -118,9 +119,9 @@ def test_commands_of_somebodys_own_have_their_numbers_units_and_names(
         and columns["spin"] == ("number", "rad")
     )
 
-    own = codec_of("own_form:Actuator", "actuator")
+    own = codec_of(find_component("actuator", "own_form:Actuator"))
     pull = own.encode(own.kind(1.5, 2.5, (3.0, 4.0)))
-    rod = codec_of(*KINDS["position"]).encode(Command(0.25, 0.5))
+    rod = codec_of(find_component(*KINDS["position"])).encode(Command(0.25, 0.5))
     expected = {
         ("red.goal", "own", pull): (1.5, 2.5, "[3.0,4.0]", None),
         ("red.attack", "position", rod): (0.25, None, None, 0.5),

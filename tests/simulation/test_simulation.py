@@ -13,8 +13,8 @@ from foosim.capture.start_frame import read_branch
 from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.event_requests import BadEvent
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.validate_network import BadEvent
 from foosim.players.learning.table_rewards import with_ball
 from foosim.protocol.messages import Received
 from foosim.simulation.agents import LEARNER

@@ -8,10 +8,10 @@ from typing import Any, Final
 import pytest
 
 from foosim.common.json_text import decode_json
-from foosim.deployment.event_requests import BadEvent, event_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.rules import EVENTS_MAX, event_of
 from foosim.deployment.network.settings_text import event_words
+from foosim.deployment.validate_network import BadEvent, event_text
 from foosim.protocol.messages import Answer
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System

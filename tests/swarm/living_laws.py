@@ -14,6 +14,7 @@ from foosim.world.assembly.volumes import Volumes
 from foosim.world.edits import Disrupt, Set, counters, parked
 from foosim.world.forms.jobs import CHANGED, NUMBERS, RUNNING, STATES, JobState
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.setting.settable import QUARANTINED
@@ -171,5 +172,5 @@ def _given(book: Book, closing: Closing) -> Iterator[tuple[tuple[str, int], tupl
     """Yield sender, number and place of each job that a tick's deliveries give or cancel."""
     for packet in closing.delivered:
         if (packet.destination, packet.channel) == (book.robot, book.actuator):
-            command = codec_of(book.kind, "actuator").decode(packet.payload)
+            command = codec_of(find_component("actuator", book.kind)).decode(packet.payload)
             yield (packet.source, abs(int(command.job))), (getattr(command, "x", 0.0), getattr(command, "y", 0.0))

@@ -21,6 +21,7 @@ from foosim.simulation.run import rehearse
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
 from foosim.world.forms.per_field import codec_of
+from foosim.world.forms.registry import find_component
 from foosim.world.sensors.laser_scanner import LaserScannerSettings, directions
 from tests.own_forms import TABLE, folder_on_path, written
 
@@ -98,7 +99,7 @@ def test_each_such_sensor_has_a_topic_and_those_of_one_message_share_its_schema(
 def test_a_planar_pose_is_shown_as_it_was_sent_with_its_noise(shown: Path, capture: CaptureData) -> None:
     packets = capture.packets.where(capture.packets.channel == "pose")
     sent = {
-        at: codec_of("pose", "sensor").decode(payload)
+        at: codec_of(find_component("sensor", "pose")).decode(payload)
         for at, payload in zip(packets.sent_ns, packets.payload, strict=True)
     }
     messages = messages_of(shown, "pose")

@@ -39,7 +39,7 @@ from foosim.world.actuators.wheel_speeds import Drive
 from foosim.world.actuators.x_y_w import Velocity as Base
 from foosim.world.forms.payloads import PayloadCodec, field_at
 from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import names
+from foosim.world.forms.registry import find_component, names
 from foosim.world.sensors.ball import BallPosition
 from foosim.world.sensors.battery import Battery
 from foosim.world.sensors.encoder import RodPosition
@@ -154,7 +154,7 @@ SINGLE = {"figure_contact": 1, "job": 2}
 
 
 def codec(kind: str) -> PayloadCodec:
-    return codec_of(kind, "sensor" if kind in names("sensor") else "actuator")
+    return codec_of(find_component("sensor" if kind in names("sensor") else "actuator", kind))
 
 
 def test_every_kind_is_tested() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.assembly.misfits import models_of
+from foosim.deployment.validate import models_of
 from foosim.world.forms import registry
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
@@ -167,7 +167,7 @@ def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
     (problem,) = problems("robots.red.goal.sensors.encoder.modifiers=[{kind: 'own_form:Own'}]")
     line = len((site / "own_form.py").read_text().splitlines()) - 1
     why = f"ZeroDivisionError: integer division or modulo by zero (own_form.py:{line})"
-    assert problem.endswith(f"modifiers[0]: its check failed: {why}, 'own_form:Own'")
+    assert problem.endswith(f"modifiers[0]: its check fails: {why}, 'own_form:Own'")
 
 
 @pytest.mark.parametrize(("bound", "said"), [("gt=0", "not above 0, 0"), ("lt=0", "not below 0, 0"),
@@ -203,10 +203,7 @@ def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
     about = "slots={'x': 1}, variants={'rigid': {'is_rigid': True, 'slots': {'y': 2}}}"
     written(site, *settings, f"model('own', Moved, {about})(Own)")
     model = find_model("own_form:Own")
-    asked: list[Any] = [
-        model.settings.model_validate({"model": "own_form:Own", "dynamics": its}) for its in ("none", "rigid")
-    ]
-    plain, rigid = (registry.model_of(its) for its in asked)
+    plain, rigid = (model.variant(its) for its in ("none", "rigid"))
     assert plain is model and (rigid.name, rigid.is_rigid) == ("own", True)
     assert [*plain.fields_of(None, None)] == ["x", "down", "refused", "clamped"]
     assert [*rigid.fields_of(None, None)] == ["y", "down", "refused", "clamped", "quarantined"]

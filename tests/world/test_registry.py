@@ -567,7 +567,8 @@ def test_readings_of_a_sensor_of_ones_own_reach_a_player_and_the_capture(tmp_pat
     assert frames[60].at("red.goal", "reach.samples") == 12.0, "100 Hz of 500"
     export_capture(tmp_path / "run.mcap", "packets", tmp_path / "packets.csv")
     sent = open_capture(tmp_path / "run.mcap").packets
-    values = [codec_of("reach", "sensor").decode(payload) for payload in sent.where(sent.channel == "reach").payload]
+    codec = codec_of(find_component("sensor", "reach"))
+    values = [codec.decode(payload) for payload in sent.where(sent.channel == "reach").payload]
     assert len(values) == 12 and [value.tick for value in values] == [float(tick) for tick in range(0, 60, 5)]
     assert '""slide"":' in (tmp_path / "packets.csv").read_text(), "a table has them by name"
     assert rehearsed(REACH, WINCH_OF_GOAL, hears, nodes=3)[0].digests == done.digests, "law 1"

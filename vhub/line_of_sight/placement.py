@@ -12,7 +12,6 @@ from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
 from foosim.vhub.line_of_sight.occlusion import Crossing, LineOfSight, Sight, Trace
 from foosim.world.assembly.world import build_scene
-from foosim.world.forms import registry
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics, velocity
 from foosim.world.layout import Entity, Layout
@@ -124,7 +123,7 @@ class World:
     def vehicle_height_m(self, name: str) -> float | None:
         """Return how high the hull of a vehicle is, without its antenna (m); None for what is no vehicle."""
         robot = self._deployment.robots.get(name)
-        if robot is None or not (VEHICLE in robot.tags or VEHICLE in registry.model_of(robot).tags):
+        if robot is None or not (VEHICLE in robot.tags or VEHICLE in robot.component_type.tags):
             return None
         body = self._robot(name).body
         return None if body is None else shape_box(body.links[0].shapes[0])[1][2]

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 from foosim.deployment.network.link_settings import Profile, Profiles
 from foosim.deployment.schema import Deployment
-from foosim.world.forms import registry
 from foosim.world.forms.per_field import payload_bytes
 
 Key = tuple[str, str]
@@ -115,11 +114,9 @@ def _sizes(deployment: Deployment, flow: Flow) -> Iterator[tuple[str, int]]:
     robot = deployment.robots.get(name)
     if robot is None:
         return
-    form = "actuator" if is_command else "sensor"
     for channel, settings in sorted((robot.actuators if is_command else robot.sensors).items()):
         if is_command or channel == flow.channel:
-            component = registry.find_component(form, settings.kind)
-            counts = registry.model_of(robot).fields_of(robot, deployment)
-            size = payload_bytes(component, settings, counts)
+            counts = robot.component_type.fields_of(robot, deployment)
+            size = payload_bytes(settings.component_type, settings, counts)
             if size is not None:
                 yield f"{name} {channel}", size

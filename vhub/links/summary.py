@@ -17,8 +17,8 @@ from foosim.deployment.network.link_settings import NO_RADIO, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network.traces import read_opportunities
-from foosim.deployment.radio_checks import unheeded
 from foosim.deployment.schema import Deployment
+from foosim.deployment.validate_network import unheeded
 from foosim.vhub.links.offered_load import flows_of, long_packets, offered_hz, used_links
 from foosim.vhub.links.phase import phase_warnings
 from foosim.vhub.network.jitter import interpolate_ns, jitter_ns, moments_ns

@@ -113,8 +113,7 @@ class Gripper:
         """Raise Misfit for a link that is not there, an engine without grasps, a robot that it does not solve."""
         engines = [registry.find("engine", name) for name in registry.names("engine")]
         having = [one.name for one in engines if isinstance(one, Engine) and one.grasps]
-        engine = registry.find("engine", at.spec.engine)
-        if not (isinstance(engine, Engine) and engine.grasps):
+        if not at.spec.engine_type.grasps:
             what = f"the engine {at.spec.engine} has no grasps: valid is {' or '.join(having)}"
             raise Misfit(("kind",), what, settings.kind)
         if not (at.robot.is_rigid and at.robot.kind.couples):

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.world.events import Value, WorldEvent
-from foosim.world.layout import WORLD, find_rule, kits_named, spares_of, world_rules
+from foosim.world.layout import WORLD, spares_of
 from foosim.world.spec import WorldSpec
 
 
@@ -49,8 +49,8 @@ def done_to(name: str, event: WorldEvent) -> list[Scheduled]:
 
 def matched(spec: WorldSpec, selector: str) -> list[str]:
     """Return the robots, objects and what kits bring that a selector matches, in name order; `world` is the world."""
-    brought = [name for kit in kits_named(spec) for name in (*kit.entities, *spares_of(spec, kit))]
-    if selector == WORLD and any(find_rule(one).settable for one in world_rules(spec).values()):
+    brought = [name for kit in spec.kit_types.values() for name in (*kit.entities, *spares_of(spec, kit))]
+    if selector == WORLD and any(one.component_type.settable for one in spec.world_rules.values()):
         return [WORLD]
     return [name for name in sorted((*spec.robots, *spec.objects, *brought)) if fnmatchcase(name, selector)]
 

@@ -8,7 +8,6 @@ from typing import Final
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_quoted
 from foosim.world.fixed_scenery import kits_of
-from foosim.world.forms import registry
 from foosim.world.matter.physics import Physics, physics_from
 from foosim.world.spec import WorldSpec
 
@@ -52,7 +51,7 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
 
 
 def _has_rigid(spec: WorldSpec) -> bool:
-    return any(registry.model_of(one).is_rigid for one in (*spec.robots.values(), *spec.objects.values()))
+    return any(one.component_type.is_rigid for one in (*spec.robots.values(), *spec.objects.values()))
 
 
 def _too_long(spec: WorldSpec) -> Iterator[Finding]:
@@ -75,7 +74,7 @@ def _unfelt(spec: WorldSpec, *, has_rigid: bool) -> Iterator[Finding]:
     for name, kit in kits_of(spec) if has_rigid else ():
         made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()], scenery))  # type: ignore[attr-defined]
     if spec.scene is not None and has_rigid:
-        surfaces = [shape.surface for shape in registry.find("scene", spec.scene.kind).made(spec.scene)]
+        surfaces = [shape.surface for shape in spec.scene.component_type.made(spec.scene)]
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces, scenery))
     for name, thing in spec.scenery.items():
         made.append((("scenery", name, "surface"), f"scenery {name}", [thing.surface], scenery))

@@ -31,7 +31,6 @@ from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, WritableView, called
 from foosim.world.components.watching import ReadOnly
-from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult, failure_of
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout, build_layout
@@ -77,10 +76,10 @@ def _place_of(spec: WorldSpec, error: ComponentError) -> Location:
 def _try_sections(spec: WorldSpec) -> None:
     """Make scene and kits, and ask for all that they have."""
     if spec.scene is not None:
-        made = registry.find("scene", spec.scene.kind).made
+        made = spec.scene.component_type.made
         called(f"scene {spec.scene.kind}", "", 0, lambda scene: _check_shapes(made, made(scene)), spec.scene)
     for name, section in sorted(spec.kits.items()):
-        called(f"kit {name}", "", 0, _try_kit, registry.find("kit", name).made, section, spec)
+        called(f"kit {name}", "", 0, _try_kit, spec.kit_types[name].made, section, spec)
 
 
 def _try_kit(made: Any, section: Any, spec: WorldSpec) -> None:

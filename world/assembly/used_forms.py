@@ -24,7 +24,7 @@ from foosim.world.forms import registry
 from foosim.world.forms.failures import OURS, in_library
 from foosim.world.forms.forms import Form, Model
 from foosim.world.forms.settings import ActuatorSettings, SensorSettings
-from foosim.world.layout import find_motion, kits_named, spares_of, world_rules
+from foosim.world.layout import find_motion, spares_of
 from foosim.world.spec import WorldSpec
 
 DIGEST_BYTES: Final = 8
@@ -37,25 +37,25 @@ def forms_of(spec: WorldSpec) -> list[Form]:
 
 
 def _forms_of(spec: WorldSpec) -> Iterator[Form]:
-    yield registry.find("engine", spec.engine)
-    for kit in kits_named(spec):
+    yield spec.engine_type
+    for kit in spec.kit_types.values():
         yield kit
         for name in (*kit.entities.values(), *spares_of(spec, kit).values()):
             yield from _with_motion(registry.find_model(name))
-    for rule in world_rules(spec).values():
-        yield registry.find("rule", rule.kind)
+    for rule in spec.world_rules.values():
+        yield rule.component_type
     if spec.scene is not None:
-        yield registry.find("scene", spec.scene.kind)
+        yield spec.scene.component_type
     for thing in spec.objects.values():
-        yield from _with_motion(registry.model_of(thing))
+        yield from _with_motion(thing.component_type)
     for robot in spec.robots.values():
-        yield from _with_motion(registry.model_of(robot))
+        yield from _with_motion(robot.component_type)
         for sensor in robot.sensors.values():
-            yield from _with_modifiers("sensor", sensor)
+            yield from _with_modifiers(sensor)
         for actuator in robot.actuators.values():
-            yield from _with_modifiers("actuator", actuator)
+            yield from _with_modifiers(actuator)
         for of_entity in robot.rules.values():
-            yield registry.find("entity_rule", of_entity.kind)
+            yield of_entity.component_type
 
 
 def _with_motion(model: Model) -> Iterator[Form]:
@@ -64,10 +64,10 @@ def _with_motion(model: Model) -> Iterator[Form]:
         yield find_motion(model)
 
 
-def _with_modifiers(form: str, settings: SensorSettings | ActuatorSettings) -> Iterator[Form]:
-    yield registry.find(form, settings.kind)
+def _with_modifiers(settings: SensorSettings | ActuatorSettings) -> Iterator[Form]:
+    yield settings.component_type
     for modifier in settings.modifiers:
-        yield registry.find("modifier", modifier.kind)
+        yield modifier.component_type
 
 
 def foreign_versions(spec: WorldSpec) -> dict[str, str]:

@@ -39,11 +39,10 @@ from foosim.world.components.view import (
 from foosim.world.components.watching import watched, watched_actuator
 from foosim.world.edits import parked
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
-from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult, failure_of
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
-from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_motion, find_rule, world_rules
+from foosim.world.layout import WORLD, Entity, Layout, find_motion
 from foosim.world.scene import Body, Scene
 from foosim.world.spec import WorldSpec
 
@@ -94,8 +93,8 @@ def body_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Body:
 def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     """Return the rules of a world by name, in name order. Raises ComponentError."""
     rules: dict[str, Rule] = {}
-    for label, settings in world_rules(spec).items():
-        found = find_rule(settings)
+    for label, settings in spec.world_rules.items():
+        found = settings.component_type
         at = RuleMounting(spec, layout, label, draw_key(spec.seed, "rule", label), frozenset(found.writes))
         rules[label] = called(f"rule {label}", WORLD, 0, found.made, settings, at)
     return rules
@@ -129,7 +128,7 @@ def initial_numbers(
         entity = layout.entities[index]
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for robot in layout.robots:
-        if any(hasattr(find_entity_rule(its).made, "place") for its in spec.robots[robot.name].rules.values()):
+        if any(hasattr(its.component_type.made, "place") for its in spec.robots[robot.name].rules.values()):
             for label, own in entity_rules_of(spec, layout, robot):
                 if hasattr(own, "place"):
                     placed = watched(own) if is_watched else own
@@ -172,8 +171,8 @@ def count_commands(frame: Frame) -> dict[str, int]:
 def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
     """Return in words what rules and kits show, and the commands that were not taken as they came, from what
     `world_status` returned."""
-    made = [find_rule(settings).made for settings in world_rules(spec).values()]
-    made += [registry.find("kit", name).made for name in sorted(spec.kits)]
+    made = [settings.component_type.made for settings in spec.world_rules.values()]
+    made += [kit.made for kit in spec.kit_types.values()]
     found = [status["failed"]] if "failed" in status else []
     for one in dict.fromkeys(made):
         if hasattr(one, "text"):
@@ -189,8 +188,8 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
 
 def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
     """Return the kinds of what rules mark, by name."""
-    made = [find_rule(settings).made for settings in world_rules(spec).values()]
-    made += [find_entity_rule(rule).made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
+    made = [settings.component_type.made for settings in spec.world_rules.values()]
+    made += [rule.component_type.made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
     own = {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
     return {FAILED: FAILED_LOOK, **({EVENT: EVENT_LOOK} if spec.events else {}), **own}
 
@@ -205,7 +204,7 @@ class WorldMarks:
         self._rules |= {
             (robot.name, label): rule
             for robot in layout.robots
-            if any(hasattr(find_entity_rule(its).made, "marks") for its in spec.robots[robot.name].rules.values())
+            if any(hasattr(its.component_type.made, "marks") for its in spec.robots[robot.name].rules.values())
             for label, rule in entity_rules_of(spec, layout, robot)
             if hasattr(rule, "marks")
         }
@@ -578,7 +577,7 @@ def entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tup
     """Return the rules of a robot by name, in name order. Raises ComponentError."""
     rules = []
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
-        found = find_entity_rule(settings)
+        found = settings.component_type
         key = draw_key(spec.seed, "entity_rule", robot.name, label)
         at = Mounting(spec, layout, robot, label, key, frozenset(found.written))
         rules.append((label, called(f"rule {label}", robot.name, 0, found.made, settings, at)))

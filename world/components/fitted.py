@@ -23,7 +23,6 @@ from foosim.world.components.view import (
     called,
     component_error,
 )
-from foosim.world.forms import registry
 from foosim.world.forms.failures import WrongResult
 from foosim.world.forms.forms import SAMPLES, Component
 from foosim.world.forms.payloads import FLOAT, PayloadCodec, as_floats
@@ -239,7 +238,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
     """Return the sensors of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].sensors.items()):
-        component = registry.find_component("sensor", settings.kind)
+        component = settings.component_type
         key = draw_key(spec.seed, "sensor", robot.name, channel)
         mounting = Mounting(spec, layout, robot, channel, key, is_owners=True)
         sensor = _made(component, settings, mounting)
@@ -253,7 +252,7 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
                 *spec.schedule(settings),
                 robot.offsets[f"{channel}.{SAMPLES}"],
                 sensor,
-                codec_of(settings.kind, "sensor"),
+                codec_of(component),
                 modifiers,
                 0 if numbers is None else numbers.size,
                 robot.offsets[slot_that_speaks(robot, channel, speaks)] if speaks else -1,
@@ -266,13 +265,13 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
     """Return the actuators of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].actuators.items()):
-        component = registry.find_component("actuator", settings.kind)
+        component = settings.component_type
         mounting = Mounting(spec, layout, robot, channel, draw_key(spec.seed, "actuator", robot.name, channel))
         made = _made(component, settings, mounting)
         modifiers = tuple(_modifiers(component, settings, mounting, made, Spacing(1, spec.tick_ns / 1e9)))
         numbers = numbers_of(component, settings, robot.counts)
         size = 0 if numbers is None else numbers.size
-        codec = codec_of(settings.kind, "actuator")
+        codec = codec_of(component)
         bounds = called(f"actuator {channel}", robot.name, 0, CommandBounds, made, codec)
         counter = robot.offsets["clamped"]
         joints = called(f"actuator {channel}", robot.name, 0, _joints, component, settings, mounting)
@@ -341,6 +340,6 @@ def _modifiers(
         key = draw_key(spec.seed, component.form, robot.name, channel, label)
         own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key, is_owners=mounting.is_owners)
         at = ModifierMounting(own, numbers, low, high, spec.tick_ns, of_values.period_s, of_values.least_ticks, key)
-        one = _made(registry.find_component("modifier", its.kind), its, at)
+        one = _made(its.component_type, its, at)
         accept, due = getattr(one, "accept", one.apply), getattr(one, "due", None)
         yield FittedModifier(f"modifier {label} of {channel}", robot.name, one, accept, due)

@@ -17,7 +17,6 @@ from pydantic import BeforeValidator, StrictFloat, StrictInt, WithJsonSchema
 from foosim.common import units
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.units import Dimension, custom_error
-from foosim.world.forms import registry
 from foosim.world.forms.forms import NO_SLOTS, Component
 from foosim.world.forms.payloads import Field, PayloadCodec, field_at, many_of
 from foosim.world.forms.settings import ComponentSettings
@@ -75,12 +74,13 @@ class Numbers:
         return field_at(self.fields, self.size, place)
 
 
-@cache
-def codec_of(kind: str, form: str) -> PayloadCodec:
+def codec_of(component: Component) -> PayloadCodec:
     """Return the codec of a component's readings or commands."""
-    component = registry.find_component(form, kind)
-    assert component.value is not None, f"{form} {kind} carries nothing"
-    return PayloadCodec(component.value, component.name)
+    assert component.value is not None, f"{component.form} {component.name} carries nothing"
+    return _codec(component.value, component.name)
+
+
+_codec = cache(PayloadCodec)
 
 
 def numbers_of(
@@ -91,7 +91,7 @@ def numbers_of(
 
     `counts` are how many numbers the fields of its robot have.
     """
-    fields = codec_of(component.name, component.form).fields
+    fields = codec_of(component).fields
     many = many_of(fields)
     if not all(field.is_number for field in fields[: len(fields) - many]) or (many and not component.several):
         return None
@@ -110,7 +110,7 @@ def payload_bytes(component: Component, settings: ComponentSettings, counts: Map
     numbers = numbers_of(component, settings, counts)
     if numbers is not None:
         return 8 * numbers.size
-    codec = codec_of(component.name, component.form)
+    codec = codec_of(component)
     if codec.size is not None:
         return codec.size
     many = many_of(codec.fields)

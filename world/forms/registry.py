@@ -288,11 +288,6 @@ def find_model(kind: str) -> Model:
     return found
 
 
-def model_of(settings: EntitySettings) -> Model:
-    """Return the model of entities with these settings: the variant of it that they ask for; raises like `find`."""
-    return find_model(settings.model).variant(getattr(settings, "dynamics", None))
-
-
 def names(form: str) -> list[str]:
     """Return the names of all that are installed here, in name order: foosim's own, and those of other packages."""
     for name in _own_modules(form):

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Final
+from typing import Annotated, Any, Final, Self
 
-from pydantic import Field, SerializeAsAny, StringConstraints
+from pydantic import Field, PrivateAttr, SerializeAsAny, StringConstraints
 
 from foosim.common import limits, names
 from foosim.common.spec_base import Name, Offset, Rate, SpecBase, default
@@ -16,7 +16,23 @@ TAGS_MAX: Final = 16
 Tag = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 
 
-class ComponentSettings(SpecBase):
+class TypedSettings(SpecBase):
+    """Settings that know the component type that they were read for: it is resolved once, when they are read."""
+
+    _component_type: Any = PrivateAttr(default=None)
+
+    def typed(self, component_type: Any) -> Self:
+        """The same, which are for a component type from now on."""
+        self._component_type = component_type
+        return self
+
+    @property
+    def component_type(self) -> Any:
+        """The registered component type; of an entity its model, in the variant that the settings choose."""
+        return self._component_type
+
+
+class ComponentSettings(TypedSettings):
     """What the settings of each component have: its kind, a registered name or `module:Class`."""
 
     kind: str
@@ -52,7 +68,7 @@ class SceneSettings(ComponentSettings):
     """What the settings of each scene have."""
 
 
-class EntitySettings(SpecBase):
+class EntitySettings(TypedSettings):
     """What the settings of every entity have: its model, a registered name or `module:Class`.
 
     `tags` are for those who look for entities of a kind, beside the tags of its model. A `spare` is absent until it is

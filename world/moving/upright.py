@@ -11,7 +11,6 @@ from math import sqrt
 from typing import Any
 
 from foosim.world.components.entities import mounting_of
-from foosim.world.forms import registry
 from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity, Layout
 from foosim.world.scene import Body, Capsule, Cylinder, Sphere, shape_box
@@ -34,7 +33,7 @@ def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
 
 def stands_upright(settings: EntitySettings) -> bool:
     """Whether robots with these settings move by kinematics and say what their cylinder is, and are no kit's."""
-    model = registry.model_of(settings)
+    model = settings.component_type
     return (
         bool(model.motion) and not model.kit and hasattr(model.made, "upright") and "position" in (model.declared or ())
     )

@@ -13,7 +13,6 @@ from math import hypot
 
 from foosim.common.finding import Finding, Location, path_text
 from foosim.common.names import nearest_quoted
-from foosim.world.forms import registry
 from foosim.world.parameters.table import TABLE, Strips, Table
 from foosim.world.spec import WorldSpec
 
@@ -40,7 +39,7 @@ def _robots(table: Table, spec: WorldSpec) -> Iterator[Finding]:
     """Lines exist and have one rod a team; other models may have such keys, too."""
     rods: dict[tuple[str, str], str] = {}
     for name, robot in spec.robots.items():
-        if registry.model_of(robot).name != "rod":
+        if robot.component_type.name != "rod":
             continue
         team, line = robot.team, robot.line  # type: ignore[attr-defined]
         if line not in table.lines:

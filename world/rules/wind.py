@@ -18,7 +18,7 @@ from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import WritableView
 from foosim.world.forms.registry import rule
 from foosim.world.forms.settings import RuleSettings
-from foosim.world.layout import WORLD, Layout, world_rules
+from foosim.world.layout import WORLD, Layout
 from foosim.world.spec import WorldSpec
 
 AIR_SPEED: Final = Quantity(units.SPEED, "-100 m/s", "100 m/s")
@@ -51,7 +51,7 @@ class Air(NamedTuple):
 
 def air_of(spec: WorldSpec, layout: Layout) -> Air | None:
     """Return the air of a world with wind."""
-    for label, settings in world_rules(spec).items():
+    for label, settings in spec.world_rules.items():
         if isinstance(settings, WindSettings):
             offsets = layout[WORLD].offsets
             return Air(settings.density, settings.viscosity, tuple(offsets[f"{label}.{axis}"] for axis in AXES))

@@ -28,10 +28,7 @@ from foosim.world.layout import (
     WORLD,
     Entity,
     Layout,
-    find_entity_rule,
-    find_rule,
     switches_of,
-    world_rules,
 )
 from foosim.world.parameters.vehicles import leaning
 from foosim.world.placing import At, is_placed
@@ -171,15 +168,15 @@ def _of_component(
 def _declared(spec: WorldSpec, layout: Layout, entity: Entity) -> Iterator[tuple[str, Any, Mapping[str, Quantity]]]:
     """Yield what has something that can be set: the model, without a name, and the rules; each with what that is."""
     if entity.name == WORLD:
-        settings = world_rules(spec)
+        settings = spec.world_rules
         yield from (
-            (label, made, find_rule(settings[label]).settable) for label, made in rules_of(spec, layout).items()
+            (label, made, settings[label].component_type.settable) for label, made in rules_of(spec, layout).items()
         )
         return
     if entity.kind.settable:
         yield "", model_of(spec, layout, entity), entity.kind.settable
     for label, rule in () if not entity.is_robot else entity_rules_of(spec, layout, entity):
-        yield label, rule, find_entity_rule(spec.robots[entity.name].rules[label]).settable
+        yield label, rule, spec.robots[entity.name].rules[label].component_type.settable
 
 
 def _put(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, value: object) -> list[Set]:
