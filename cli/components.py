@@ -16,8 +16,7 @@ from foosim.world.placing import is_placed
 from foosim.world.setting.settable import valid
 
 OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
-    "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
-    "motion": ("writes",),
+    "model": ("is_robot", "mover", "actuators", "rules", "tags"),
     "rule": ("each", "writes"),
     "entity_rule": ("writes", "shared"),
     "kit": ("entities", "rules", "presets"),
@@ -61,7 +60,6 @@ def as_json(component: Form) -> dict[str, Any]:
         "slots": None if callable(slots) else {field: int(size) for field, size in slots.items()},
         "needs": list(getattr(component, "needs", ())),
         "kit": component.kit,
-        "meshes": getattr(component, "meshes", False),
         **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.form, ())},
         "settable": _settable(component),
     }
@@ -91,7 +89,7 @@ def _settable(component: Form) -> dict[str, str]:
 def _moved(model: Model) -> dict[str, Any]:
     """Return what moves the entities of a model, and the slots of their state."""
     slots = None if callable(model.slots) else {field: int(size) for field, size in model.slots.items()}
-    return {"is_rigid": model.is_rigid, "motion": model.motion, "slots": slots}
+    return {"mover": model.mover, "slots": slots}
 
 
 def line(component: Form) -> str:
@@ -122,8 +120,6 @@ def lines(component: Form) -> Iterator[str]:
     yield from _lines_of_form(about)
     if about["settable"]:
         yield f"  can be set: {', '.join(f'{name} ({valid})' for name, valid in about['settable'].items())}"
-    if about["meshes"]:
-        yield "  has scenery of triangles (shape: mesh)"
     if component.kit:
         yield f"  needs a deployment with: {component.kit}"
 
@@ -138,10 +134,10 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  slots that are the model's where it has them: {', '.join(about['shared'])}"
     if about["form"] == "model":
         yield "  a robot" if about["is_robot"] else "  no robot: nobody owns it"
-        yield f"  moved by: {_mover_of(about)}"
+        yield f"  moved by: {about['mover']}"
         for dynamics, its in about.get("variants", {}).items():
             slots = "by its settings" if its["slots"] is None else _counted(its["slots"])
-            yield f"  with dynamics: {dynamics}, moved by: {_mover_of(its)}; slots: {slots}"
+            yield f"  with dynamics: {dynamics}, moved by: {its['mover']}; slots: {slots}"
     usual = "usual " if about["form"] == "model" else ""
     for key in ("actuators", "rules"):
         if about.get(key):
@@ -153,10 +149,6 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  beside the robots: {_paired(about['entities'])}"
     if about.get("presets"):
         yield f"  presets: {', '.join(about['presets'])}"
-
-
-def _mover_of(about: Mapping[str, Any]) -> str:
-    return "an engine" if about["is_rigid"] else about["motion"] or "nothing"
 
 
 def _paired(kinds: Mapping[str, str]) -> str:

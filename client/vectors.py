@@ -58,7 +58,7 @@ class _Part(NamedTuple):
 def numbers_in(one: FittedSensor | FittedActuator) -> int:
     """Return how many numbers a reading or plain command has; 0 of one that is not numbers, or not always as many."""
     made: Any = one.sensor if isinstance(one, FittedSensor) else one.actuator
-    size = len(made.bounds()) if not one.size and hasattr(made, "bounds") else one.size
+    size = one.size or len(getattr(made, "bounds", tuple)() or ())
     return size - one.codec.has_job if size else 0
 
 

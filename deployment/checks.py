@@ -22,7 +22,7 @@ from foosim.deployment.text.selection import TooManyComparisons
 from foosim.world.assembly.misfits import checked_spares, find_kit_model, kit_problems, needs_kit, rule_problems
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
-from foosim.world.forms.forms import Engine, Kit, Model, WorldRule
+from foosim.world.forms.forms import Kit, Model, WorldRule
 from foosim.world.layout import WORLD
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.scenery import SceneryMesh
@@ -85,9 +85,9 @@ def _kits(deployment: Deployment) -> Iterator[Finding]:
     spares = {key: checked_spares(deployment, kit) for key, kit in kits.items()}
     entities = {key: {**kit.entities, **spares[key][0]} for key, kit in kits.items()}
     for key, kit in kits.items():
-        check = getattr(kit.made, "check", None)
+        made: Any = kit.made
         try:
-            yield from [*check(deployment.kits[key], deployment)] if check is not None else []
+            yield from [*made.check(deployment.kits[key], deployment)]
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # SystemExit, too: a kit may do anything
@@ -287,8 +287,7 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 def _scenery(deployment: Deployment) -> Iterator[Finding]:
     """Some engines have no meshes, only free bodies feel surfaces; waves cross a material, or have a loss."""
-    engine = registry.find("engine", deployment.engine)
-    assert isinstance(engine, Engine), engine
+    engine = registry.find_engine(deployment.engine)
     has_rigid = any(model.can_be_free for model in _models(deployment))
     for name, thing in deployment.scenery.items():
         for owner, things in (("a robot's", deployment.robots), ("an object's", deployment.objects)):

@@ -87,7 +87,7 @@ def _unknown_engine(kind: Any) -> Iterator[Finding]:
     if not isinstance(kind, str):
         return
     try:
-        registry.find("engine", kind)
+        registry.find_engine(kind)
     except BadValue as error:
         yield Finding(("engine",), error.problem, kind, error.nearest)
 
@@ -313,9 +313,8 @@ def _unfit(
     if findings:
         return
     try:
-        check = getattr(component.made, "check", None)
-        if check is not None:
-            check(settings, numbers)
+        made: Any = component.made
+        made.check(settings, numbers)
     except BadValue as error:
         yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)
     except KeyboardInterrupt:

@@ -7,7 +7,7 @@ from foosim.common.names import CLASS_PATTERN
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.file_schema import file_schema
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Form, Kit, Model, with_article, word_of
+from foosim.world.forms.forms import ENGINES, Form, Kit, Model, with_article, word_of
 from foosim.world.forms.settings import BASES, EntitySettings, RobotSettings
 from foosim.world.spec import KITS
 
@@ -58,9 +58,8 @@ def _kit(name: str) -> Kit:
 
 def _any_engine(*, installed: bool) -> dict[str, Any]:
     """Return the schema of an engine's name."""
-    found = [registry.find("engine", name) for name in registry.names("engine")]
-    known = [engine.name for engine in found if installed or engine.module.startswith(OWN)]
-    return {"anyOf": [{"enum": known, "type": "string"}, _class()], "title": "Engine"}
+    known = [name for name in registry.engines() if installed or ENGINES[name].path.startswith(OWN)]
+    return {"enum": known, "title": "Engine", "type": "string"}
 
 
 def _class() -> dict[str, Any]:

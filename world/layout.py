@@ -31,7 +31,6 @@ from foosim.world.forms.forms import (
     EntityRule,
     Kit,
     Model,
-    Motion,
     References,
     WorldRule,
 )
@@ -355,13 +354,6 @@ def find_entity_rule(settings: ComponentSettings) -> EntityRule:
     return found
 
 
-def find_motion(model: Model) -> Motion:
-    """Return the registered motion of a model that has one."""
-    found = registry.find("motion", model.motion)
-    assert isinstance(found, Motion), found
-    return found
-
-
 def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]:
     """Return what the rules of a world remember: of each entity, by its model; and of the world."""
     each: dict[str, dict[str, int]] = {}
@@ -376,9 +368,7 @@ def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]
 
 def of_motion(model: Model) -> dict[str, int]:
     """Return the slots in which the motion of a model remembers."""
-    if not model.motion:
-        return {}
-    return _behind(MOTION, find_motion(model).slots)
+    return {} if model.motion is None else _behind(MOTION, model.motion.slots)
 
 
 @dataclass(frozen=True, slots=True)
@@ -400,7 +390,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     model = registry.model_of(robot)
     fields = model.fields_of(robot, spec)
     joints = fields.get("joint_positions", 0)
-    yield Declaring(f"motion {model.motion}", (*place, "model"), of_motion(model))
+    yield Declaring("motion", (*place, "model"), of_motion(model))
     for label, actuator in sorted(robot.actuators.items()):
         component = registry.find_component("actuator", actuator.kind)
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from foosim.deployment.schema import Deployment
+from foosim.world.components.base import overrides
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.view import ComponentError, called
 from foosim.world.forms import registry
@@ -26,9 +27,9 @@ class Overlays:
         self._failures: list[str] = []
         for robot in layout.robots:
             kinds = {sensor.kind for sensor in deployment.robots[robot.name].sensors.values()}
-            if any(hasattr(registry.find_component("sensor", kind).made, "rays") for kind in kinds):
+            if any(overrides(registry.find_component("sensor", kind).made, "rays") for kind in kinds):
                 for fitted in self._sensors_of(deployment, layout, robot):
-                    if hasattr(fitted.sensor, "rays"):
+                    if overrides(type(fitted.sensor), "rays"):
                         self._groups.setdefault((type(fitted.sensor), fitted.size), []).append(fitted)
 
     def content(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:
@@ -93,7 +94,7 @@ def _rays_of(sensors: Sequence[FittedSensor], frame: Frame) -> list[list[float]]
 
 
 def _drawn(sensors: Sequence[FittedSensor], numbers: list[float]) -> list[list[float]]:
-    rays = type(sensors[0].sensor).rays  # type: ignore[attr-defined]
+    rays = type(sensors[0].sensor).rays
     given = rays([fitted.sensor for fitted in sensors], numbers)
     is_fit = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim == 2 and given.shape[1] == 6
     if not (is_fit and np.isfinite(given).all()):

@@ -238,8 +238,8 @@ def _together(deployment: Deployment, layout: Layout) -> list[list[FittedActuato
         motion = layout.entities[index].kind.motion
         for one in actuators:
             kind = type(one.actuator)
-            if motion and has_together(kind, "command"):
-                found.setdefault((motion, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
+            if motion is not None and has_together(kind, "command"):
+                found.setdefault((motion.__qualname__, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
     return list(found.values())
 
 
@@ -279,7 +279,7 @@ class _Compared:
         view = View(frame.tick, ReadOnly(frame.numbers), start=frame.numbers)
         members = [one.actuator for one in actuators]
         what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in actuators[:NAMED_MAX])}"
-        made = called(what, "", frame.tick, type(members[0]).together, members)  # type: ignore[attr-defined]
+        made = called(what, "", frame.tick, type(members[0]).together, members)
         together = some_together(what, frame.tick, made, members, np.arange(len(members))[::-1])
         asked = asked_together(what, together, len(actuators), view)[::-1]
         for one, its in zip(actuators, asked.tolist(), strict=True):

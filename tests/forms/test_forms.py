@@ -37,7 +37,7 @@ OF_FILES: Final = [("model", "urdf"), ("actuator", "joint_torque"), *HEADS]
 ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
 EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
 ALONE: Final = {
-    *(("engine", "pure"), ("scene", "boxes"), ("scene", "football_table"), ("scene", "hall")),
+    *(("scene", "boxes"), ("scene", "football_table"), ("scene", "hall")),
     *(("actuator", "go_to"), ("actuator", "gripper"), ("actuator", "joint_trajectory")),
     *(("sensor", "gripper_state"), ("sensor", "job")),
 }

@@ -37,6 +37,7 @@ from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import Mounting
 from foosim.world.forms.forms import ENTITY
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import EntityRule, Rule, Sensor
 from foosim.world.forms.registry import rule, sensor
 from foosim.world.forms.settings import RuleSettings, SensorSettings
 
@@ -51,7 +52,7 @@ class Settings(SensorSettings):
 SENSOR: Final = """
 
 @sensor("own", Settings, Number, slots={{"kept": 1}}, needs=("joint_positions",))
-class Own:
+class Own(Sensor):
     def __init__(self, settings, at):
         self.at, self.kept, self.joints = at, at.slot("kept"), at.slot("joint_positions")
         self.count = 0
@@ -69,7 +70,7 @@ class OwnSettings(RuleSettings):
 
 
 @rule("own", OwnSettings, slots={"sum": 16})
-class Own:
+class Own(Rule):
     def __init__(self, settings, at):
         self.sum = at.slot("sum")
         self.joints = [at.of(rod, "joint_positions") for rod in at.layout.of("rod")]
@@ -259,7 +260,7 @@ def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
 SPEAKS: Final = """
 
 @sensor("own", Settings, Number, needs=("contacts",), speaks="contacts")
-class Own:
+class Own(Sensor):
     def __init__(self, settings, at):
         self.contacts = at.slot("contacts")
 
@@ -287,7 +288,7 @@ def test_a_sensor_that_speaks_is_heard_at_each_tick_of_a_contact(planted: Path) 
 ALARMS: Final = """
 
 @sensor("own", Settings, Number, slots={"alarm": 1}, speaks="SPEAKS")
-class Own:
+class Own(Sensor):
     def __init__(self, settings, at):
         self.alarm = at.slot("alarm")
 
@@ -300,8 +301,8 @@ class Alarming(EntityRuleSettings):
     pass
 
 
-@entity_rule("own", Alarming, slots={"alarm": 1})
-class Alarms:
+@rule("own", Alarming, slots={"alarm": 1})
+class Alarms(EntityRule):
     def __init__(self, settings, at):
         self.alarm = at.slot("alarm")
 

@@ -9,6 +9,7 @@ from typing import Final
 
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import initial_numbers
+from foosim.world.components.base import Model
 from foosim.world.components.fitted import FittedSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import Mounting, SensingView, WritableView
@@ -25,7 +26,7 @@ class FreeRobot(RobotSettings):
 
 
 @model("free_body", FreeRobot, slots=SLOTS)
-class FreeBody:
+class FreeBody(Model):
     """Two links: one that is free, and a hand that is fixed to it."""
 
     def __init__(self, settings: FreeRobot, at: Mounting) -> None:

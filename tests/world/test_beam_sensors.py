@@ -109,7 +109,7 @@ def test_readings_are_held_between_the_least_and_the_range(fleet_text: Text) -> 
         assert set(near.read()) == {4.0}
         near.set("rover01", (19.7, -1.0, 0.0))
         assert set(near.read()) == {0.5}
-        assert list(near.sensor().sensor.limits().values()) == [(0.5, 4.0)]  # type: ignore[attr-defined]
+        assert list(near.sensor().sensor.limits().values()) == [(0.5, 4.0)]
 
 
 def test_a_cone_sees_what_a_beam_passes(fleet_text: Text) -> None:
@@ -122,7 +122,7 @@ def test_a_cone_sees_what_a_beam_passes(fleet_text: Text) -> None:
     assert cone.read() == pytest.approx([2.0 / cos(radians(15.0)) - 0.05])
     for ray in (True, False):
         one = (cone if ray else beam).sensor().sensor
-        assert type(one).rays([one], cone.numbers).shape == (13 if ray else 1, 6)  # type: ignore[attr-defined]
+        assert type(one).rays([one], cone.numbers).shape == (13 if ray else 1, 6)
 
 
 def test_a_robot_of_any_kind_measures_from_its_own_hull(fleet_text: Text) -> None:

@@ -218,6 +218,7 @@ FAILING: Final = '''
 from msgspec import Struct
 
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import Sensor
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
 
@@ -233,7 +234,7 @@ class Reading(Struct, frozen=True):
 
 
 @sensor("failing", Settings, Reading)
-class Failing:
+class Failing(Sensor):
     """Fails."""
 
     def __init__(self, settings, at):

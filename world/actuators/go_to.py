@@ -7,6 +7,7 @@ from msgspec import Struct
 
 from foosim.common.exact_math import atan2, cos, hypot, sin
 from foosim.common.spec_base import Length, default
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Misfit, Mounting, View, WritableView
 from foosim.world.forms.jobs import JobState
@@ -50,7 +51,7 @@ class Place(Struct, frozen=True):
     needs=("position", "heading"),
     jobs=True,
 )
-class GoTo:
+class GoTo(Actuator):
     """Keeps the last place that it was told; without any the robot stands."""
 
     def __init__(self, settings: GoToSettings, at: Mounting) -> None:
@@ -66,7 +67,7 @@ class GoTo:
     def check(settings: GoToSettings, at: Mounting) -> None:
         """Raise Misfit for a robot that neither has wheels nor goes in any direction."""
         is_base = isinstance(at.spec.robots[at.robot.name], HolonomicRobot)
-        if not is_base and not hasattr(made_model(at.spec, at.layout, at.robot), "wheels"):
+        if not is_base and made_model(at.spec, at.layout, at.robot).wheels() is None:
             raise Misfit(("kind",), "it moves robots on two wheels, and those of the model holonomic", settings.kind)
 
     def limits(self) -> dict[str, tuple[float, float]]:

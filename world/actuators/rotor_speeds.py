@@ -11,6 +11,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import RadiansPerSecond
@@ -32,7 +33,7 @@ class RotorSpeeds(Struct, frozen=True):
 
 
 @actuator("rotor_speeds", RotorSpeedsSettings, RotorSpeeds, slots={"set_point": 4}, needs=("angular_velocity",))
-class RotorSpeedsActuator:
+class RotorSpeedsActuator(Actuator):
     """Rotors that keep the last speeds that they were told."""
 
     def __init__(self, settings: RotorSpeedsSettings, at: Mounting) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from foosim.common.exact_math import hypot
+from foosim.world.components.base import Actuator
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
@@ -27,7 +28,7 @@ class Velocity(Struct, frozen=True):
 
 
 @actuator("x_y_w", XYWSettings, Velocity, slots={"set_point": 3}, needs=("base_velocity",))
-class VelocityActuator:
+class VelocityActuator(Actuator):
     """The drive of a base, which keeps the last velocity that it was told."""
 
     def __init__(self, settings: XYWSettings, at: Mounting) -> None:

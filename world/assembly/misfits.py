@@ -12,18 +12,17 @@ from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, Unknown
 from foosim.common.finding import Finding, Location
 from foosim.common.keyed_random import draw_key
 from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
+from foosim.world.components.base import overrides
 from foosim.world.components.view import Misfit, Mounting
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     ROBOTS,
     Component,
-    Engine,
     EntityRule,
     Form,
     Kit,
     Model,
-    Motion,
     WorldRule,
     with_article,
     word_of,
@@ -81,21 +80,6 @@ def model_problems(model: Model, kits: Collection[str], having: Mapping[str, int
     """
     if model.is_rigid and not model.couples and model.name not in REACHED:
         yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
-    if not model.motion:
-        return
-    try:
-        motion = registry.find("motion", model.motion)
-    except BadValue as error:
-        yield f"a model without its motion: {error}"
-        return
-    assert isinstance(motion, Motion), motion
-    has = model.declared if having is None else having
-    for verb, fields in (("needs", motion.needs), ("writes", motion.writes)):
-        missing = [] if has is None else [field for field in fields if field not in has]
-        if missing:
-            yield f"a model whose motion {motion.name} {verb} {', '.join(missing)}: {_fields_of(model, missing, has)}"
-    for problem in needs_kit(motion, kits, motion.name):
-        yield f"a model whose motion is {problem}"
 
 
 def component_problems(form: Form, model: Model, having: Mapping[str, int] | None = None) -> Iterator[str]:
@@ -249,7 +233,7 @@ def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
         (name, *component)
         for name, robot in spec.robots.items()
         for component in components_of(robot)
-        if hasattr(component[-1].made, "check")
+        if overrides(component[-1].made, "check")
     ]
     layout = build_layout(spec) if checked else None
     for name, section, channel, settings, form in checked:
@@ -271,7 +255,7 @@ def unheard(spec: WorldSpec) -> Iterator[Finding]:
         for channel, settings in robot.sensors.items():
             sensor = registry.find_component("sensor", settings.kind)
             speaks = sensor.speaks_by(settings)
-            if not speaks or (callable(sensor.speaks) and hasattr(sensor.made, "check")):
+            if not speaks or (callable(sensor.speaks) and overrides(sensor.made, "check")):
                 continue  # its own check names the setting
             layout = layout or build_layout(spec)
             if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
@@ -300,7 +284,7 @@ def doubled_slots(spec: WorldSpec) -> Iterator[Finding]:
     for kit in kits_named(spec):
         for name, model in kit.entities.items():
             kind = registry.find_model(model)
-            motion = Declaring(f"motion {kind.motion}", (kit.name,), of_motion(kind))
+            motion = Declaring("motion", (kit.name,), of_motion(kind))
             yield from _doubled([motion, *(one for its, one in of_rules if its == kind.name)], name)
 
 
@@ -342,8 +326,7 @@ class _Rigid(NamedTuple):
 
 def engine_findings(spec: WorldSpec) -> Iterator[Finding]:
     """Rigid bodies that the engine does not have, those of which no engine has both, and wind that it does not have."""
-    engine = registry.find("engine", spec.engine)
-    assert isinstance(engine, Engine), engine
+    engine = registry.find_engine(spec.engine)
     winds = [name for name, settings in spec.rules.items() if isinstance(settings, WindSettings)]
     if winds and not engine.islands:
         what = f"the engine has no air, and the world has the rule {winds[0]}, which is wind"

@@ -28,8 +28,7 @@ class Standing:
         self._places = {
             entity.index: at
             for entity, at in self._having
-            if entity.index not in ruled
-            and all(getattr(one.actuator, "steady", False) for one in actuators.get(entity.index, ()))
+            if entity.index not in ruled and all(one.actuator.steady for one in actuators.get(entity.index, ()))
         }
 
     def awake(

@@ -31,7 +31,7 @@ from foosim.world.clearance.solids import (
     solids,
 )
 from foosim.world.components.entities import MotionMounting
-from foosim.world.components.view import Slot, SolvingView
+from foosim.world.components.view import Slot, WritableView
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import WORLD, Entity
 from foosim.world.moving.upright import is_upright, made_model, upright_of
@@ -97,7 +97,7 @@ class FreeWay:
         assert (way > 0.0).all(), "the body of what moves says how fast it can be"
         return Movers(rows, radius, self._low[rows], self._high[rows], way, np.ceil(way / radius), is_level)
 
-    def near(self, movers: Movers, view: SolvingView) -> Near:
+    def near(self, movers: Movers, view: WritableView) -> Near:
         """Return what these may meet within the tick."""
         everybody = view.values[self._places]
         candidates = movers.candidates

@@ -9,16 +9,14 @@ from typing import Any, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
+from foosim.world.components.base import Actuator, Modifier, Sensor, overrides
 from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
 from foosim.world.components.job_book import JobBook
 from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import (
-    Actuator,
     ComponentError,
-    Modifier,
     ModifierMounting,
     Mounting,
-    Sensor,
     WritableView,
     called,
     component_error,
@@ -40,10 +38,8 @@ class FittedModifier:
     what: str
     robot: str
     modifier: Modifier
-    apply_command: Callable[[list[float], WritableView], list[float] | None]
-    """What takes a command: `accept` where there is one, else `apply`."""
-    due: Callable[[WritableView], list[float] | None] | None
-    """What returns a command that had to wait; None of a modifier that lets none wait."""
+    waits: bool
+    """Whether commands may have to wait in it."""
 
     def apply(self, values: list[float], view: WritableView) -> list[float] | None:
         """Return what becomes of the numbers of a reading. Raises ComponentError."""
@@ -51,11 +47,11 @@ class FittedModifier:
 
     def accept(self, values: list[float], view: WritableView) -> list[float] | None:
         """Return what becomes of the numbers of a command; None where it is dropped or waits. Raises ComponentError."""
-        return self._checked(len(values), view, self.apply_command, values, view)
+        return self._checked(len(values), view, self.modifier.accept, values, view)
 
     def take_due(self, size: int, view: WritableView) -> list[float] | None:
         """Return the numbers of a command whose time has come, of so many. Raises ComponentError."""
-        return None if self.due is None else self._checked(size, view, self.due, view)
+        return self._checked(size, view, self.modifier.due, view) if self.waits else None
 
     def _checked(
         self, size: int, view: WritableView, call: Callable[..., list[float] | None], *arguments: Any
@@ -68,7 +64,7 @@ class FittedModifier:
                 floats = values if FLOAT.issuperset(map(type, values)) else as_floats(values)
                 if floats is not None:
                     return floats
-            raise WrongResult(call, f"a list of {size} numbers, or None,", values)
+            raise WrongResult(call, f"a list of {size} numbers, or None", values)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
 
@@ -142,7 +138,7 @@ class FittedActuator:
     @property
     def has_waiting(self) -> bool:
         """Whether commands may have to wait for their tick."""
-        return any(one.due is not None for one in self.modifiers)
+        return any(one.waits for one in self.modifiers)
 
     def accept(self, payload: bytes, view: WritableView, source: str = "") -> bool:
         """Take a command of an endpoint, clamped to its limits; False when it is refused. Raises ComponentError."""
@@ -173,12 +169,12 @@ class FittedActuator:
 
         Modifiers may change it before. Raises ComponentError.
         """
-        problem, why = getattr(self.actuator, "problem", None), ""
+        why = ""
         try:
             command = self.codec.decode_finite(payload)
             found = self.bounds.clamp(command)
-            if problem is not None and (self.jobs is None or command.job >= 0.0):
-                why = problem(command)
+            if self.jobs is None or command.job >= 0.0:
+                why = self.actuator.problem(command)
         except Malformed as error:
             return str(error), ()
         except BaseException as error:
@@ -342,5 +338,5 @@ def _modifiers(
         own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key, is_owners=mounting.is_owners)
         at = ModifierMounting(own, numbers, low, high, spec.tick_ns, of_values.period_s, of_values.least_ticks, key)
         one = _made(registry.find_component("modifier", its.kind), its, at)
-        accept, due = getattr(one, "accept", one.apply), getattr(one, "due", None)
-        yield FittedModifier(f"modifier {label} of {channel}", robot.name, one, accept, due)
+        waits = overrides(type(one), "due")
+        yield FittedModifier(f"modifier {label} of {channel}", robot.name, one, waits)

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import msgspec
 
-from foosim.world.components.view import Actuator, Mounting, View, WritableView
+from foosim.world.components.base import Actuator
+from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.failures import WrongResult
 from foosim.world.forms.jobs import CHANGED, JOB, NUMBER_MAX, NUMBERS, RUNNING, STATES, JobState
 

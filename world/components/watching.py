@@ -83,7 +83,4 @@ def watched_actuator(one: FittedActuator) -> FittedActuator:
 
 
 def _watched_modifier(one: FittedModifier) -> FittedModifier:
-    made = watched(one.modifier)
-    return replace(
-        one, modifier=made, apply_command=getattr(made, "accept", made.apply), due=getattr(made, "due", None)
-    )
+    return replace(one, modifier=watched(one.modifier))

@@ -22,7 +22,7 @@ class WrongResult(Exception):
 
     def __init__(self, method: Callable[..., Any], needed: str, given: object) -> None:
         name = getattr(method, "__name__", type(method).__name__)
-        super().__init__(f"{name} gives {_value(given)}, where {needed} is needed")
+        super().__init__(f"{name}() returned {_value(given)}; expected {needed}")
         self.method = method
 
 

@@ -245,11 +245,12 @@ class Model(Form):
 
     `slots` are the fields of its state, or a function of settings and world that returns them. Those that foosim itself
     needs it has whatever it declares: robots `down`, `refused` and `clamped`, what is solved `quarantined`. An engine
-    solves one that is rigid; one with a `motion` goes on by that; any other stays as it is. A robot has an owner, and
-    sends and receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a
-    deployment. `units` are those of its fields' numbers, the last one standing for all behind it; fields that every
-    model calls the same need none. `variants` are what it is instead where its setting `dynamics` has one of these
-    values. `settable` is what can be set of it, as of a rule of entities (`EntityRule`): fields of its state.
+    solves one that is rigid; one with a `motion`, a class derived from `components.base.Motion`, moves by that; any
+    other stays as it is. A robot has an owner, and sends and receives packets. `actuators` and `rules` are those of a
+    robot that says nothing of them, as in a deployment. `units` are those of its fields' numbers, the last one standing
+    for all behind it; fields that every model calls the same need none. `variants` are what it is instead where its
+    setting `dynamics` has one of these values. `settable` is what can be set of it, as of a rule of entities
+    (`EntityRule`): fields of its state.
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
@@ -261,7 +262,7 @@ class Model(Form):
     is_rigid: bool = False
     couples: bool = True
     """Whether something in it couples its parts, as the motors of an arm do: its island has a solve of its own."""
-    motion: str = ""
+    motion: type[Any] | None = None
     actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
@@ -276,7 +277,12 @@ class Model(Form):
     @property
     def is_solved(self) -> bool:
         """Whether a node computes its next state; that of any other stays as it is."""
-        return self.is_rigid or bool(self.motion)
+        return self.is_rigid or self.motion is not None
+
+    @property
+    def mover(self) -> str:
+        """What moves its entities, in a word."""
+        return "an engine" if self.is_rigid else "nothing" if self.motion is None else self.motion.__name__
 
     @property
     def declared(self) -> Mapping[str, int] | None:
@@ -312,19 +318,6 @@ class Model(Form):
     def needed(self) -> tuple[str, ...]:
         """The fields that foosim itself needs."""
         return (*(OF_ROBOTS if self.is_robot else ()), *(OF_SOLVED if self.is_solved else ()))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Motion(Form):
-    """How entities without rigid-body dynamics go on.
-
-    `needs` are the fields of an entity that it reads, `writes` those that it alone writes, `slots` what it remembers
-    besides, as `motion.FIELD`.
-    """
-
-    needs: tuple[str, ...] = ()
-    writes: tuple[str, ...] = ()
-    slots: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -368,18 +361,30 @@ class EntityRule(Form):
         return (*self.writes, *self.shared)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Engine(Form):
-    """What computes rigid bodies.
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """What computes rigid bodies: `module:Class` of what is made from deployment and layout (`node.physics.interface`).
 
     `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
-    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table. `grasps` says that
-    it holds two bodies together as `Island.welds` say.
+    after the other (`IslandEngine`). Any other has rods and balls of a table. `grasps` says that it holds two bodies
+    together as `Island.welds` say.
     """
 
+    name: str
+    path: str
     meshes: bool = False
     islands: bool = False
     grasps: bool = False
+
+
+ENGINES: Final[dict[str, Engine]] = {
+    "bullet": Engine("bullet", "foosim.node.physics.bullet_engine:BulletEngine", meshes=True),
+    "mujoco": Engine(
+        "mujoco", "foosim.node.physics.mujoco_islands:MujocoIslands", meshes=True, islands=True, grasps=True
+    ),
+    "pure": Engine("pure", "foosim.node.physics.pure_engine:PureEngine"),
+}
+"""The engines by name; a package adds its own in a module that it names as an entry point."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

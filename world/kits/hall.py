@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from foosim.common.finding import Finding
 from foosim.world.clearance.hall_obstacles import obstacles_of
 from foosim.world.clearance.hall_start import start_findings
+from foosim.world.components.base import Kit
 from foosim.world.forms.registry import kit
 from foosim.world.parameters.hall import HALL, Hall
 from foosim.world.parameters.hall_checks import hall_findings
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @kit(HALL, Hall)
-class HallKit:
+class HallKit(Kit):
     """A hall with walls, in which rovers drive and stations charge them."""
 
     def __init__(self, section: Hall, spec: WorldSpec) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.common.errors import BadValue
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS
 from foosim.world.forms.registry import model
@@ -27,7 +28,7 @@ ORANGE: Final[Colour] = (1.0, 0.5, 0.0, 1.0)
     couples=False,
     kit="table",
 )
-class Ball:
+class Ball(Model):
     """A ball: a solid sphere, I = 2/5 m r^2."""
 
     def __init__(self, settings: None, at: Mounting) -> None:

@@ -13,6 +13,7 @@ from foosim.common.errors import BadValue
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.bodies.urdf import Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
 from foosim.world.forms.registry import model
@@ -81,7 +82,7 @@ def _slots(settings: UrdfRobot, spec: WorldSpec) -> dict[str, int]:
 
 
 @model("urdf", UrdfRobot, slots=_slots, is_rigid=True)
-class Urdf:
+class Urdf(Model):
     """A robot from a URDF file; its joints start at 0, or at the limit that is nearest to it."""
 
     def __init__(self, settings: UrdfRobot, at: Mounting) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Any
 
+from foosim.world.components.base import overrides
 from foosim.world.components.entities import mounting_of
 from foosim.world.forms import registry
 from foosim.world.forms.settings import EntitySettings
@@ -36,19 +37,22 @@ def stands_upright(settings: EntitySettings) -> bool:
     """Whether robots with these settings move by kinematics and say what their cylinder is, and are no kit's."""
     model = registry.model_of(settings)
     return (
-        bool(model.motion) and not model.kit and hasattr(model.made, "upright") and "position" in (model.declared or ())
+        model.motion is not None
+        and not model.kit
+        and overrides(model.made, "upright")
+        and "position" in (model.declared or ())
     )
 
 
 def is_upright(model: Any) -> bool:
     """Whether a model that moves is a cylinder to obstacles; one whose `is_upright` is False is what its shapes are."""
-    return bool(getattr(model, "is_upright", True))
+    return bool(model.is_upright)
 
 
 def upright_of(model: Any) -> Upright:
     """Return the cylinder of a model of an entity that has a body."""
-    if hasattr(model, "upright"):
-        found: Upright = model.upright()
+    found: Upright | None = model.upright()
+    if found is not None:
         return found
     body = model.body()
     assert body is not None, "what has no body meets nothing"

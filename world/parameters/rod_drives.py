@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, Protocol
 from foosim.common import units
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Actuator
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.upright import made_model
@@ -104,7 +105,7 @@ class RodCommand(Protocol):
     def spin(self) -> float: ...
 
 
-class RodSetPoint:
+class RodSetPoint(Actuator):
     """What the last command asked of a rod's motors, in the slot `set_point`: two numbers, each within its bounds."""
 
     steady: ClassVar = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.energy.battery import batteries_of, cell_of, is_rover
 from foosim.world.forms.quantities import Share, Volts
@@ -23,7 +24,7 @@ class Battery(Struct, frozen=True):
 
 
 @sensor("battery", BatterySettings, Battery)
-class BatteryGauge:
+class BatteryGauge(Sensor):
     """Charge of a battery as a share of its capacity, and its voltage, which falls evenly with the charge."""
 
     def __init__(self, settings: BatterySettings, at: Mounting) -> None:

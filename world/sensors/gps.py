@@ -7,6 +7,7 @@ from typing import ClassVar, Final
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.earth import Geodesy
@@ -38,7 +39,7 @@ class GlobalPosition(Struct, frozen=True):
 
 
 @sensor("gps", GpsSettings, GlobalPosition, shown_as="foxglove.LocationFix")
-class Gps:
+class Gps(Sensor):
     """Latitude, longitude and altitude of the mount."""
 
     def __init__(self, settings: GpsSettings, at: Mounting) -> None:

@@ -6,6 +6,7 @@ from msgspec import Struct
 
 from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import Name
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.forms.jobs import CHANGED, FAILURE, NUMBERS, RUNNING, STATES
 from foosim.world.forms.quantities import Count
@@ -34,7 +35,7 @@ class Jobs(Struct, frozen=True):
 
 
 @sensor("job", JobSettings, Jobs, speaks=lambda settings: f"{settings.actuator}.{CHANGED}")
-class JobSensor:
+class JobSensor(Sensor):
     """Whose job an actuator does, and the last job of each sender, with how it stands."""
 
     def __init__(self, settings: JobSettings, at: Mounting) -> None:

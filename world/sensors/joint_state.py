@@ -9,6 +9,7 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import Name
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.forms import JOINTS
@@ -45,7 +46,7 @@ def joints_of(settings: JointStateSettings, counts: Mapping[str, int]) -> int:
 
 
 @sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, several=joints_of)
-class JointStates:
+class JointStates(Sensor):
     """Positions, velocities and efforts of joints."""
 
     def __init__(self, settings: JointStateSettings, at: Mounting) -> None:

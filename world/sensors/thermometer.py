@@ -15,6 +15,7 @@ from msgspec import Struct
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Sensor
 from foosim.world.components.fires import Fires
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View
@@ -45,7 +46,7 @@ class Temperature(Struct, frozen=True):
 
 
 @sensor("thermometer", ThermometerSettings, Temperature)
-class Thermometer:
+class Thermometer(Sensor):
     """The temperature at the mount, by the distance from all fires that burn."""
 
     def __init__(self, settings: ThermometerSettings, at: Mounting) -> None:

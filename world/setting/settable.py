@@ -18,6 +18,7 @@ from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
 from foosim.common.units import PROBABILITY, Quantity
 from foosim.world.assembly.world import body_of, entity_rules_of, model_of, rules_of
+from foosim.world.components.base import overrides
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Set, write, written
@@ -98,7 +99,7 @@ def _is_placed(spec: WorldSpec, entity: Entity) -> bool:
     if "position" not in entity.fields:
         return False
     settings = spec.settings_of(entity.name)
-    return hasattr(entity.kind.made, "place_at") if settings is None else is_placed(type(settings))
+    return overrides(entity.kind.made, "place_at") if settings is None else is_placed(type(settings))
 
 
 def set_edits(
@@ -139,8 +140,6 @@ def set_edits(
         raise BadValue(f"no field of {entity.name} that can be set ({there})", field, nearest_name(field, fields))
     made, quantity = found[0]
     number = _number(quantity, value)
-    if not hasattr(made, "set"):
-        return [Set(entity.name, field, [number])]
     what = label or f"model {entity.model}"
     return called(what, entity.name, 0, _of_component, entity, label, made.set, name, number)
 
@@ -163,7 +162,7 @@ def _of_component(
     for slot, numbers in ask(name, number).items():
         field = _field(label, slot) if _field(label, slot) in entity.offsets else slot
         if entity.counts.get(field) != len(numbers) or not all(map(isfinite, numbers)):
-            raise WrongResult(ask, "finite numbers by slot, as many as each has,", {slot: numbers})
+            raise WrongResult(ask, "finite numbers by slot, as many as each has", {slot: numbers})
         found.append(Set(entity.name, field, [*map(float, numbers)]))
     return found
 
@@ -234,8 +233,7 @@ def add_edit(
         for edit in _put(spec, layout, after, entity, place):
             write(layout, after, edit)
     for label, rule in entity_rules_of(spec, layout, entity) if entity.is_robot else ():
-        if hasattr(rule, "place"):
-            called(f"rule {label}", entity.name, 0, rule.place, view)
+        called(f"rule {label}", entity.name, 0, rule.place, view)
     if is_checked:
         check_place(spec, layout, after, entity)
     return Add(entity.name, after[start : entity.stop])
@@ -245,8 +243,7 @@ def check_place(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entit
     """Raise BadValue where an entity is in something in a frame of these numbers, or beyond the bounds of its model."""
     at = entity.offsets["position"]
     where = ", ".join(f"{number:g} m" for number in numbers[at : at + 3])
-    is_plausible = getattr(model_of(spec, layout, entity), "is_plausible", None)
-    if is_plausible is not None and not is_plausible(numbers, numbers):
+    if not model_of(spec, layout, entity).is_plausible(numbers, numbers):
         raise BadValue(f"a place beyond the bounds of the world: {entity.name} would be quarantined there", where)
     if what := occupied_by(spec, layout, numbers, entity):
         raise BadValue(f"a place that is occupied: {entity.name} would be in {what}", where)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
@@ -31,7 +32,7 @@ class JointPositions(Struct, frozen=True):
     needs=("joint_positions",),
     joints="joints",
 )
-class JointPositionActuator:
+class JointPositionActuator(Actuator):
     """A proportional loop: speed = gain x (set-point - position); the motor has at most the effort of the joint."""
 
     def __init__(self, settings: JointPositionSettings, at: Mounting) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
@@ -23,7 +24,7 @@ class JointEfforts(Struct, frozen=True):
 @actuator(
     "joint_torque", JointTorqueSettings, JointEfforts, slots=set_points, needs=("joint_positions",), joints="joints"
 )
-class JointTorqueActuator:
+class JointTorqueActuator(Actuator):
     """Motors that apply the last efforts that they were told, up to the greatest speeds of their joints."""
 
     def __init__(self, settings: JointTorqueSettings, at: Mounting) -> None:

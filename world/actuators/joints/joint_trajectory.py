@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import default
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.forms import Carrier
@@ -83,7 +84,7 @@ def _slots(settings: JointTrajectorySettings, carrier: Carrier) -> Mapping[str, 
     joints="joints",
     jobs=True,
 )
-class JointTrajectory:
+class JointTrajectory(Actuator):
     """Keeps the points of the last command, and the tick that it came in.
 
     `set_point` is where its way began; without points it is where the joints stay.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
@@ -28,7 +29,7 @@ class JointVelocities(Struct, frozen=True):
     needs=("joint_positions",),
     joints="joints",
 )
-class JointVelocityActuator:
+class JointVelocityActuator(Actuator):
     """Motors that keep the last speeds that they were told."""
 
     def __init__(self, settings: JointVelocitySettings, at: Mounting) -> None:

@@ -9,6 +9,7 @@ from typing import Final
 from msgspec import Struct
 
 from foosim.common.exact_math import atan2
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, link_index
 from foosim.world.components.view import Misfit, Mounting, View, WritableView
@@ -50,7 +51,7 @@ def _slots(settings: LookAtSettings, carrier: Carrier) -> Mapping[str, int]:
 
 
 @actuator("look_at", LookAtSettings, Sight, slots=_slots, needs=("joint_positions",), joints="joints", jobs=True)
-class LookAt:
+class LookAt(Actuator):
     """Keeps the last place that it was told, and turns towards it.
 
     Pan turns by the angle about its axis between where it looks and the place, tilt by that between their heights. Both

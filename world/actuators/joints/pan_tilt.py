@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.jobs import JobState
@@ -30,7 +31,7 @@ class PanTiltAngles(Struct, frozen=True):
     joints="joints",
     jobs=True,
 )
-class PanTilt:
+class PanTilt(Actuator):
     """Keeps the last angles that it was told: a proportional loop, as that of `joint_position`."""
 
     def __init__(self, settings: PanTiltSettings, at: Mounting) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Count, NewtonSeconds
 from foosim.world.forms.registry import sensor
@@ -26,7 +27,7 @@ class Touches(Struct, frozen=True):
 
 
 @sensor("contact", ContactSettings, Touches, needs=("contacts",), speaks="contacts")
-class ContactSensor:
+class ContactSensor(Sensor):
     """Touches of a robot in the last tick: how many began, their impulse, the last substep with one."""
 
     def __init__(self, settings: ContactSettings, at: Mounting) -> None:

@@ -6,6 +6,7 @@ from msgspec import Struct
 
 from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import Name, default
+from foosim.world.components.base import Sensor
 from foosim.world.components.grasping import portables_of
 from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.forms.quantities import Kilograms, Share
@@ -28,7 +29,7 @@ class GripperState(Struct, frozen=True):
 
 
 @sensor("gripper_state", GripperStateSettings, GripperState)
-class GripperSensor:
+class GripperSensor(Sensor):
     """Whether a gripper is told to close, whether it holds something, and the mass of that."""
 
     def __init__(self, settings: GripperStateSettings, at: Mounting) -> None:

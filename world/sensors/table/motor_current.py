@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import Misfit, Mounting, View
 from foosim.world.forms.quantities import Amperes
@@ -38,7 +39,7 @@ class Currents(Struct, frozen=True):
 
 
 @sensor("motor_current", MotorCurrentSettings, Currents, needs=("joint_efforts",), kit="table")
-class MotorCurrent:
+class MotorCurrent(Sensor):
     """The currents of a rod's motors: force and torque in the last substep over the motors' constants."""
 
     def __init__(self, settings: MotorCurrentSettings, at: Mounting) -> None:
