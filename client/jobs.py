@@ -89,7 +89,7 @@ class Jobs:
         its = deployment.robots[robot]
         self.what: Final = f"{robot}/{actuator}"
         kind = find_component("actuator", its.actuators[actuator].kind)
-        self._failures: Mapping[float, str] = getattr(kind.made, "FAILURES", {})
+        self._failures: Mapping[float, str] = getattr(kind.factory, "FAILURES", {})
         if not kind.jobs:
             raise BadValue(f"{self.what} does no jobs", its.actuators[actuator].kind)
         self.senders: Final = deployment.senders_to(robot)

@@ -85,7 +85,7 @@ def _kits(deployment: Deployment) -> Iterator[Finding]:
     spares = {key: checked_spares(deployment, kit) for key, kit in kits.items()}
     entities = {key: {**kit.entities, **spares[key][0]} for key, kit in kits.items()}
     for key, kit in kits.items():
-        made: Any = kit.made
+        made: Any = kit.factory
         try:
             yield from [*made.check(deployment.kits[key], deployment)]
         except KeyboardInterrupt:

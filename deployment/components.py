@@ -29,7 +29,7 @@ from foosim.world.forms.forms import (
     JOINTS_MAX,
     Carrier,
     Component,
-    Form,
+    ComponentType,
     Model,
     WorldRule,
     with_article,
@@ -200,7 +200,9 @@ class _Reader:
             self.findings += settings_findings(error, registry.find(form, kind).settings, location)
         return BASES[form].model_construct(kind=kind)
 
-    def _misfits(self, component: Form, model: Model | None, location: Location, kind: str) -> Iterator[Finding]:
+    def _misfits(
+        self, component: ComponentType, model: Model | None, location: Location, kind: str
+    ) -> Iterator[Finding]:
         """Yield what the world or a model does not have that a component needs."""
         problems = [*needs_kit(component, self.kits)]
         if not problems and model is not None:
@@ -239,7 +241,7 @@ def _unfit_component(
     """Yield why the slots of a sensor or actuator do not follow from its settings, and the settings of modifiers that
     do not fit the readings or commands that these are on."""
     period_ns = tick_ns
-    if isinstance(settings, SensorSettings) and not component.speaks:
+    if isinstance(settings, SensorSettings) and not component.trigger:
         period_ns *= schedule_of(settings, tick_ns).least_ticks
     # Joints are as many as may be where that follows from a robot's file.
     counts = dict.fromkeys(JOINTS, JOINTS_MAX) if model.declared is None else model.declared
@@ -248,7 +250,7 @@ def _unfit_component(
     for number, modifier in enumerate(settings.modifiers):
         place: Location = (*location, "modifiers", number)
         if numbers is None:
-            what = f"a modifier of what is not numbers alone: {component.form} {component.name}"
+            what = f"a modifier of what is not numbers alone: {component.type_name} {component.name}"
             yield Finding((*place, "kind"), what, modifier.kind)
         else:
             found = registry.find_component("modifier", modifier.kind)
@@ -313,7 +315,7 @@ def _unfit(
     if findings:
         return
     try:
-        made: Any = component.made
+        made: Any = component.factory
         made.check(settings, numbers)
     except BadValue as error:
         yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)

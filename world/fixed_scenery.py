@@ -14,7 +14,7 @@ from foosim.world.spec import WorldSpec
 def kits_of(spec: WorldSpec) -> Iterator[tuple[str, Kit]]:
     """Yield the kits of a world, made from their sections, by name in name order."""
     for name, section in sorted(spec.kits.items()):
-        yield name, called(f"kit {name}", "", 0, registry.find("kit", name).made, section, spec)
+        yield name, called(f"kit {name}", "", 0, registry.find("kit", name).factory, section, spec)
 
 
 def fixed_shapes(spec: WorldSpec) -> tuple[Shape, ...]:
@@ -28,4 +28,4 @@ def scene_shapes(spec: WorldSpec) -> Sequence[Shape]:
     if spec.scene is None:
         return ()
     scene = registry.find("scene", spec.scene.kind)
-    return called(f"scene {spec.scene.kind}", "", 0, lambda settings: tuple(scene.made(settings)), spec.scene)
+    return called(f"scene {spec.scene.kind}", "", 0, lambda settings: tuple(scene.factory(settings)), spec.scene)

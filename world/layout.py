@@ -45,7 +45,9 @@ remember nothing it is not there."""
 MOTION: Final = "motion"
 """Component name of the slots in which a motion remembers."""
 
-WORLD_MODEL: Final = Model(form="model", name=WORLD, made=object, settings=RobotSettings, slots={}, is_robot=False)
+WORLD_MODEL: Final = Model(
+    type_name="model", name=WORLD, factory=object, settings=RobotSettings, slots={}, is_robot=False
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -411,11 +413,11 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
 
 
 def least_period_ns(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> int:
-    """Return the least time between two readings: a sensor that speaks may measure at each tick."""
-    return spec.tick_ns if sensor.speaks else spec.schedule(settings).least_ticks * spec.tick_ns
+    """Return the least time between two readings: a sensor with a trigger may measure at each tick."""
+    return spec.tick_ns if sensor.trigger else spec.schedule(settings).least_ticks * spec.tick_ns
 
 
-def slot_that_speaks(robot: Entity, channel: str, field: str) -> str:
+def trigger_slot(robot: Entity, channel: str, field: str) -> str:
     """Return the slot of a robot that makes a sensor of it measure: its own, else the robot's."""
     own = f"{channel}.{field}"
     return own if robot.offsets.get(own, -1) >= robot.split else field
@@ -431,7 +433,7 @@ def _demanded(robot: RobotSettings) -> dict[str, int]:
         for form, having in (("sensor", robot.sensors), ("actuator", robot.actuators))
         for its in having.values()
     ]
-    needs = [need for one, its in components for need in (*one.needs, one.speaks_by(its))]
+    needs = [need for one, its in components for need in (*one.needs, one.trigger_by(its))]
     needs += [need for its in robot.rules.values() for need in find_entity_rule(its).needs]
     return model.demanded(needs)
 

@@ -122,8 +122,8 @@ def test_a_form_is_told_of_with_what_it_brings(told: Telling, about: tuple[str, 
 
 def test_all_are_told_of_in_json(told: Telling) -> None:
     found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])["components"]
-    assert [(one["form"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
-    by_name = {(one["form"], one["name"]): one for one in found}
+    assert [(one["type"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
+    by_name = {(one["type"], one["name"]): one for one in found}
     rover, football = by_name["model", "rover"], by_name["rule", "football"]
     assert (rover["mover"], rover["is_robot"], rover["tags"]) == ("WheeledMotion", True, ["vehicle"])
     assert rover["actuators"] == {"drive": {"kind": "wheel_speeds"}} and rover["rules"]["battery"]["kind"] == "battery"

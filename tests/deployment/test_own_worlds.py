@@ -241,7 +241,7 @@ def test_models_of_a_kit_of_another_kit_need_it(site: Path) -> None:
 def test_the_forms_of_a_world_have_the_models_of_its_kits() -> None:
     """What can be added, too: two nodes with other versions of them would compute other worlds."""
     deployment = load_deployment(TEXT, TABLE.name)
-    assert ("model", "ball") in {(form.form, form.name) for form in forms_of(deployment)}
+    assert ("model", "ball") in {(form.type_name, form.name) for form in forms_of(deployment)}
 
 
 FAILING: Final = {
@@ -387,7 +387,7 @@ SPEAKS: Final = (
     "class Touch(Own):",
     "    def __init__(self, settings, at): self.contacts = at.slot('contacts')",
     "    def sample(self, view): return Number(view.read(self.contacts)[1])",
-    "sensor('touch', SensorSettings, Number, needs=('contacts',), speaks='contacts')(Touch)",
+    "sensor('touch', SensorSettings, Number, needs=('contacts',), trigger='contacts')(Touch)",
 )
 
 

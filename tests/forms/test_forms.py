@@ -50,13 +50,13 @@ EACH_ALONE: Final = pytest.mark.parametrize(
 @cache
 def own() -> list[tuple[str, str]]:
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    return sorted((form.form, form.name) for form in found if form.module == own_module(form.form, form.name))
+    return sorted((form.type_name, form.name) for form in found if form.module == own_module(form.type_name, form.name))
 
 
 def test_every_form_has_a_world_of_its_own() -> None:
     assert sorted([*WORLDS, *OF_FILES]) == own()
     for (form, name), world in WORLDS.items():
-        used = {(found.form, found.name) for found in forms_of(load_deployment(world.text(), NAME))}
+        used = {(found.type_name, found.name) for found in forms_of(load_deployment(world.text(), NAME))}
         assert (form, name) in used
 
 

@@ -152,7 +152,7 @@ def mixed() -> str:
 def test_every_form_is_in_a_mixed_world_or_has_its_laws_tested_alone() -> None:
     text, files = pin_assets(yard(), "yard.yaml", DEPLOY)
     worlds = (load_deployment(mixed(), NAME), load_deployment(text, "yard.yaml").with_assets(files))
-    used = {(form.form, form.name) for world in worlds for form in forms_of(world)}
+    used = {(form.type_name, form.name) for world in worlds for form in forms_of(world)}
     assert set(own()) - used == ALONE | HEADS
 
 

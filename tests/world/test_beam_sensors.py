@@ -12,7 +12,7 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import SensingView, View
 from foosim.world.layout import Entity, build_layout
@@ -41,7 +41,7 @@ class Robot:
         about_z = turn((0.0, 0.0, 1.0), heading)
         self.numbers[turned : turned + 4] = multiply(about_z, turn((0.0, 1.0, 0.0), pitch))
 
-    def sensor(self) -> FittedSensor:
+    def sensor(self) -> BoundSensor:
         its = sensors_of(self.deployment, self.layout, self.rover)
         return next(one for one in its if one.channel == "eye")
 

@@ -20,7 +20,7 @@ from foosim.node.tick import Stepper
 from foosim.rehearsal.run import rehearse
 from foosim.rehearsal.system import System
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.edits import Set
@@ -50,7 +50,7 @@ class Rod:
         self._sensing = Sensing()
 
     @property
-    def sensor(self) -> FittedSensor:
+    def sensor(self) -> BoundSensor:
         return next(one for one in sensors_of(self.deployment, self.layout, self.entity) if one.channel == "encoder")
 
     def read(self, tick: int, slide: float, spin: float = 0.0) -> tuple[float, ...] | None:

@@ -37,7 +37,7 @@ REFUSED: Final = {
     'sensor("own", Settings, Nothing)': "its reading Nothing has no fields",
     'sensor("own", Settings, Number, needs="contacts")': "needs: Expected `array`, got `str`",
     'sensor("own", Settings, Number, kit=3)': "kit: Expected `str`, got `int`",
-    'sensor("own", Settings, Number, several="rays")': "several names no setting, 'rays'",
+    'sensor("own", Settings, Number, array_length="rays")': "array_length names no setting, 'rays'",
     'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, ",
     'sensor("own", Settings, Number, shown_as="foxglove.PoseInFrame")': "its reading Number lacks the numbers that ",
     'sensor("own", Settings, Scan, shown_as="foxglove.LaserScan")': "its settings Settings lack bearings, which ",

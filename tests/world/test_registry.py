@@ -153,7 +153,7 @@ class Winch(Actuator):
     def hold(self, view):
         view.write(self._rate, 0.0)
 
-    def stir(self, view):
+    def excite(self, view):
         view.write(self._rate, 1.0)
 
     def command(self, view):
@@ -249,9 +249,9 @@ def test_each_stands_in_a_module_of_its_name_and_says_what_it_is(form: str) -> N
     assert names(form) == sorted(path.stem for path in folder.rglob("*.py") if path.stem != "__init__")
     for name in names(form):
         component = find(form, name)
-        assert (component.form, component.name, component.module) == (form, name, own_module(form, name))
+        assert (component.type_name, component.name, component.module) == (form, name, own_module(form, name))
         assert component.summary.endswith(".")
-        assert find(form, f"{component.module}:{component.made.__qualname__}") is component
+        assert find(form, f"{component.module}:{component.factory.__qualname__}") is component
 
 
 def test_finding_one_imports_its_module_only() -> None:
@@ -290,8 +290,8 @@ def test_an_unknown_name_says_what_there_is_and_the_nearest(form: str, kind: str
 @pytest.mark.usefixtures("site")
 def test_a_class_of_any_module_is_found_by_its_path() -> None:
     gauge = find("sensor", "own_gauges:ReachGauge")
-    assert (gauge.form, gauge.name, gauge.module) == ("sensor", "reach", "own_gauges")
-    assert gauge.made is sys.modules["own_gauges"].ReachGauge and gauge.summary == "The slide of a rod, scaled."
+    assert (gauge.type_name, gauge.name, gauge.module) == ("sensor", "reach", "own_gauges")
+    assert gauge.factory is sys.modules["own_gauges"].ReachGauge and gauge.summary == "The slide of a rod, scaled."
     assert find("sensor", "reach") is gauge, "it has its name from then on"
     winch = find_component("actuator", "own_winch:Winch")
     assert winch.slots == {"rate": 1, "taken": 1} and "own_winch" in sys.modules

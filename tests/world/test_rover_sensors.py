@@ -17,7 +17,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.tick import Stepper
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.fitted import FittedSensor, actuators_of, sensors_of
+from foosim.world.components.fitted import BoundSensor, actuators_of, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.layout import Entity, Layout, build_layout
@@ -49,11 +49,11 @@ class Fitted:
         self.numbers = initial_numbers(self.deployment, self.layout)
         self.rover = self.layout["rover01"]
 
-    def sensor(self, channel: str) -> FittedSensor:
+    def sensor(self, channel: str) -> BoundSensor:
         fitted = sensors_of(self.deployment, self.layout, self.rover)
         return next(one for one in fitted if one.channel == channel)
 
-    def payload(self, one: FittedSensor, tick: int) -> bytes:
+    def payload(self, one: BoundSensor, tick: int) -> bytes:
         (payload,) = Sensing().sample([one], SensingView(tick, self.numbers))
         assert payload is not None
         return payload

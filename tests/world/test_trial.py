@@ -84,7 +84,7 @@ class Speed(Actuator):
     def hold(self, view):
         view.write(self.wanted, 0.0)
 
-    def stir(self, view):
+    def excite(self, view):
         view.write(self.wanted, 1.0)
 
     def command(self, view):

@@ -64,7 +64,7 @@ class ForceActuator(Actuator):
         """Push no more."""
         view.write(self._set_point, *[0.0] * 6)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Push a little, for the small run that tells engines apart."""
         view.write(self._set_point, *[0.1 * self._force] * 3, *[0.1 * self._torque] * 3)
 

@@ -88,7 +88,7 @@ class GoTo(Actuator):
         """Stop it."""
         self._set(view, 0.0, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Go to a place ahead and aside, for the small run that tells engines apart."""
         x, y, _ = view.read(self._position)
         self._set(view, 1.0, x + 1.0, y + 0.5)

@@ -172,7 +172,7 @@ class Gripper(Actuator):
     def hold(self, view: WritableView) -> None:
         """Leave all as it is: what is held is held without power, too."""
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Close, for the small run that tells engines apart."""
         self.accept(Grip(1.0), view)
 

@@ -69,7 +69,7 @@ class PositionActuator(Actuator):
         """Make the present position the set-point."""
         view.write(self._set_point, *view.read(self._joints))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn, for the small run that tells engines apart."""
         view.write(self._set_point, 0.0, 1.0)
 

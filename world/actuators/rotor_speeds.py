@@ -56,7 +56,7 @@ class RotorSpeedsActuator(Actuator):
         """Stop the rotors."""
         view.write(self._set_point, 0.0, 0.0, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn the rotors unequally, for the small run that tells engines apart."""
         view.write(self._set_point, *[share * self._speed_max for share in (0.70, 0.71, 0.69, 0.70)])
 

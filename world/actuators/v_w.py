@@ -59,7 +59,7 @@ class MotionActuator(Actuator):
         """Stop the wheels."""
         view.write(self._set_point, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Drive in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.5 * self._wheels.speed, 0.3 * self._wheels.turn_rate)
 

@@ -77,7 +77,7 @@ class WaypointActuator(Actuator):
         x, y, z = view.read(self._position)
         self._set(view, x, y, z, view.read(self._heading)[0])
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Fly askew and up, for the small run that tells engines apart."""
         x, y, z = view.read(self._position)
         self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)

@@ -52,7 +52,7 @@ class DriveActuator(Actuator):
         """Stop the wheels."""
         view.write(self._set_point, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Drive in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.3 + 0.01 * (self._set_point.at % 7), 0.4)
 

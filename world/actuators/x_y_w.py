@@ -60,7 +60,7 @@ class VelocityActuator(Actuator):
         """Stop it."""
         view.write(self._set_point, 0.0, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Go askew in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.5 * self._speed, 0.3 * self._speed, 0.3 * self._turn_rate)
 

@@ -19,8 +19,8 @@ from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
     ROBOTS,
     Component,
+    ComponentType,
     EntityRule,
-    Form,
     Kit,
     Model,
     WorldRule,
@@ -36,8 +36,8 @@ from foosim.world.layout import (
     find_rule,
     kits_named,
     of_motion,
-    slot_that_speaks,
     spares_of,
+    trigger_slot,
     world_rules,
 )
 from foosim.world.rules.wind import WindSettings
@@ -67,10 +67,10 @@ def models_of(*, robots: bool) -> list[Model]:
     return [model for model in found if model.is_robot == robots]
 
 
-def needs_kit(form: Form, kits: Collection[str], noun: str = "") -> Iterator[str]:
+def needs_kit(form: ComponentType, kits: Collection[str], noun: str = "") -> Iterator[str]:
     """Yield that the world is without the kit that a form is of."""
     if form.kit and form.kit not in kits:
-        yield f"{noun or word_of(form.form)} of {with_article(form.kit)} in a world without one"
+        yield f"{noun or word_of(form.type_name)} of {with_article(form.kit)} in a world without one"
 
 
 def model_problems(model: Model, kits: Collection[str], having: Mapping[str, int] | None = None) -> Iterator[str]:
@@ -82,12 +82,12 @@ def model_problems(model: Model, kits: Collection[str], having: Mapping[str, int
         yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
 
 
-def component_problems(form: Form, model: Model, having: Mapping[str, int] | None = None) -> Iterator[str]:
+def component_problems(form: ComponentType, model: Model, having: Mapping[str, int] | None = None) -> Iterator[str]:
     """Yield what a robot of a model does not have that a component or rule of it needs; `having` as above."""
     has = model.declared if having is None else having
-    word = word_of(form.form)
+    word = word_of(form.type_name)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
-    if isinstance(form, Component) and (field := _speaks_by_model(form)) and field not in needs:
+    if isinstance(form, Component) and (field := _trigger_of_model(form)) and field not in needs:
         needs = (*needs, field)
     missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
     if missing:
@@ -116,13 +116,13 @@ def _having(fields: Collection[str]) -> Iterator[str]:
                 yield f"{model.name} with dynamics: {dynamics}"
 
 
-def _speaks_by_model(sensor: Component) -> str:
-    """Return the field of the model by which a sensor speaks; empty of one that speaks by a slot of its own, or of a
+def _trigger_of_model(sensor: Component) -> str:
+    """Return the field of the model that is the trigger of a sensor; empty where that is a slot of its own, or of a
     rule or an actuator (`unheard`)."""
-    speaks = sensor.speaks
-    if callable(speaks) or callable(sensor.slots) or speaks in sensor.slots or "." in speaks:
+    trigger = sensor.trigger
+    if callable(trigger) or callable(sensor.slots) or trigger in sensor.slots or "." in trigger:
         return ""
-    return speaks
+    return trigger
 
 
 def _fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None) -> str:
@@ -198,7 +198,7 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
 # --- a world with its files ------------------------------------------------------------------------------------------
 
 
-def components_of(robot: RobotSettings) -> Iterator[tuple[str, str, ComponentSettings, Form]]:
+def components_of(robot: RobotSettings) -> Iterator[tuple[str, str, ComponentSettings, ComponentType]]:
     """Yield the components and rules of a robot: section, name, settings and form of each."""
     for section, form in SECTIONS.items():
         for name, settings in getattr(robot, section).items():
@@ -233,14 +233,14 @@ def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
         (name, *component)
         for name, robot in spec.robots.items()
         for component in components_of(robot)
-        if overrides(component[-1].made, "check")
+        if overrides(component[-1].factory, "check")
     ]
     layout = build_layout(spec) if checked else None
     for name, section, channel, settings, form in checked:
         assert layout is not None
-        key = draw_key(spec.seed, form.form, name, channel)
+        key = draw_key(spec.seed, form.type_name, name, channel)
         at = Mounting(spec, layout, layout[name], channel, key, is_owners=section == "sensors")
-        made: Any = form.made
+        made: Any = form.factory
         try:
             made.check(settings, at)
         except Misfit as error:
@@ -254,13 +254,13 @@ def unheard(spec: WorldSpec) -> Iterator[Finding]:
     for name, robot in spec.robots.items():
         for channel, settings in robot.sensors.items():
             sensor = registry.find_component("sensor", settings.kind)
-            speaks = sensor.speaks_by(settings)
-            if not speaks or (callable(sensor.speaks) and overrides(sensor.made, "check")):
+            trigger = sensor.trigger_by(settings)
+            if not trigger or (callable(sensor.trigger) and overrides(sensor.factory, "check")):
                 continue  # its own check names the setting
             layout = layout or build_layout(spec)
-            if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
+            if trigger_slot(layout[name], channel, trigger) not in layout[name].offsets:
                 valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"
-                what = f"sensor that speaks by {speaks}, which {name} does not have: it is {valid}"
+                what = f"sensor whose trigger is {trigger}, which {name} does not have: it is {valid}"
                 yield Finding(("robots", name, "sensors", channel, "kind"), what, settings.kind)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from foosim.world.components.fitted import FittedActuator
+from foosim.world.components.fitted import BoundActuator
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 
@@ -21,7 +21,7 @@ class Standing:
     rules of their own."""
 
     def __init__(
-        self, layout: Layout, actuators: Mapping[int, Sequence[FittedActuator]], ruled: Collection[int]
+        self, layout: Layout, actuators: Mapping[int, Sequence[BoundActuator]], ruled: Collection[int]
     ) -> None:
         """`actuators` and `ruled` are by the entities' indices."""
         self._having = [(one, one.offsets[UNMOVED]) for one in layout.entities if UNMOVED in one.offsets]

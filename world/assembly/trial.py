@@ -23,7 +23,7 @@ from foosim.world.assembly.world import (
     world_status,
     world_texts,
 )
-from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundActuator, BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, View, WritableView, called
 from foosim.world.components.watching import ReadOnly
@@ -96,13 +96,13 @@ def _try_tick(spec: WorldSpec, layout: Layout) -> None:
         assert not text.startswith((NO_STATUS, NO_TEXT)), text
 
 
-def _sample(sensors: Sequence[FittedSensor], numbers: Sequence[float]) -> None:
+def _sample(sensors: Sequence[BoundSensor], numbers: Sequence[float]) -> None:
     view = SensingView(TICK, ReadOnly(numbers), np.array(numbers))
     view.values.setflags(write=False)
     Sensing().sample(sensors, view)
 
 
-def _command(one: FittedActuator, numbers: list[float]) -> None:
+def _command(one: BoundActuator, numbers: list[float]) -> None:
     view = WritableView(TICK, numbers)
     one.actuator.hold(view)
-    one.actuator.stir(view)
+    one.actuator.excite(view)

@@ -22,7 +22,7 @@ from typing import Any, Final
 
 from foosim.world.forms import registry
 from foosim.world.forms.failures import OURS, in_library
-from foosim.world.forms.forms import Form
+from foosim.world.forms.forms import ComponentType
 from foosim.world.forms.settings import ActuatorSettings, SensorSettings
 from foosim.world.layout import kits_named, spares_of, world_rules
 from foosim.world.spec import WorldSpec
@@ -30,13 +30,13 @@ from foosim.world.spec import WorldSpec
 DIGEST_BYTES: Final = 8
 
 
-def forms_of(spec: WorldSpec) -> list[Form]:
+def forms_of(spec: WorldSpec) -> list[ComponentType]:
     """Return the forms that a world is made of, each once, by form and name."""
-    found = {(form.form, form.name): form for form in _forms_of(spec)}
+    found = {(form.type_name, form.name): form for form in _forms_of(spec)}
     return [form for _, form in sorted(found.items())]
 
 
-def _forms_of(spec: WorldSpec) -> Iterator[Form]:
+def _forms_of(spec: WorldSpec) -> Iterator[ComponentType]:
     for kit in kits_named(spec):
         yield kit
         yield from map(registry.find_model, (*kit.entities.values(), *spares_of(spec, kit).values()))
@@ -55,7 +55,7 @@ def _forms_of(spec: WorldSpec) -> Iterator[Form]:
             yield registry.find("entity_rule", of_entity.kind)
 
 
-def _with_modifiers(form: str, settings: SensorSettings | ActuatorSettings) -> Iterator[Form]:
+def _with_modifiers(form: str, settings: SensorSettings | ActuatorSettings) -> Iterator[ComponentType]:
     yield registry.find(form, settings.kind)
     for modifier in settings.modifiers:
         yield registry.find("modifier", modifier.kind)
@@ -67,7 +67,7 @@ def foreign_versions(spec: WorldSpec) -> dict[str, str]:
     A version is a digest of the sources.
     """
     foreign = [form for form in forms_of(spec) if not form.is_own]
-    return {f"{form.form} {form.module}:{form.made.__qualname__}": _version(form.made) for form in foreign}
+    return {f"{form.type_name} {form.module}:{form.factory.__qualname__}": _version(form.factory) for form in foreign}
 
 
 @cache

@@ -14,7 +14,7 @@ from foosim.world.assembly.event_times import events_by_tick
 from foosim.world.components.base import EntityRule, Model, Motion, Rule, overrides
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting, mounting_of
-from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.components.view import (
     ComponentError,
     Mounting,
@@ -25,11 +25,11 @@ from foosim.world.components.view import (
     has_together,
     some_together,
 )
-from foosim.world.components.watching import watched, watched_actuator
+from foosim.world.components.watching import guarded, guarded_actuator
 from foosim.world.edits import parked
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
-from foosim.world.forms.failures import WrongResult, failure_of
+from foosim.world.forms.failures import ContractError, failure_of
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_rule, world_rules
@@ -64,7 +64,7 @@ class _Moving(NamedTuple):
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
     """Return an entity as its model. Raises ComponentError."""
     settings, at = spec.settings_of(entity.name), mounting_of(spec, layout, entity)
-    model: Model = called(f"model {entity.model}", entity.name, 0, entity.kind.made, settings, at)
+    model: Model = called(f"model {entity.model}", entity.name, 0, entity.kind.factory, settings, at)
     return model
 
 
@@ -86,7 +86,7 @@ def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     for label, settings in world_rules(spec).items():
         found = find_rule(settings)
         at = RuleMounting(spec, layout, label, draw_key(spec.seed, "rule", label), frozenset(found.writes))
-        rules[label] = called(f"rule {label}", WORLD, 0, found.made, settings, at)
+        rules[label] = called(f"rule {label}", WORLD, 0, found.factory, settings, at)
     return rules
 
 
@@ -119,9 +119,9 @@ def initial_numbers(
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for robot in layout.robots:
         for label, own in entity_rules_of(spec, layout, robot, "place"):
-            called(f"rule {label}", robot.name, 0, (watched(own) if is_watched else own).place, view)
+            called(f"rule {label}", robot.name, 0, (guarded(own) if is_watched else own).place, view)
     for label, rule in rules_of(spec, layout).items():
-        called(f"rule {label}", WORLD, 0, (watched(rule) if is_watched else rule).place, view)
+        called(f"rule {label}", WORLD, 0, (guarded(rule) if is_watched else rule).place, view)
     for name in layout.spares:
         entity = layout[name]
         numbers[entity.start : entity.stop] = parked(layout, entity)
@@ -155,8 +155,8 @@ def count_commands(frame: Frame) -> dict[str, int]:
 def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
     """Return in words what rules and kits show, and the commands that were not taken as they came, from what
     `world_status` returned."""
-    made: list[Any] = [find_rule(settings).made for settings in world_rules(spec).values()]
-    made += [registry.find("kit", name).made for name in sorted(spec.kits)]
+    made: list[Any] = [find_rule(settings).factory for settings in world_rules(spec).values()]
+    made += [registry.find("kit", name).factory for name in sorted(spec.kits)]
     found = [status["failed"]] if "failed" in status else []
     for one in dict.fromkeys(made):
         try:
@@ -171,8 +171,10 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
 
 def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
     """Return the kinds of what rules mark, by name."""
-    made: list[Any] = [find_rule(settings).made for settings in world_rules(spec).values()]
-    made += [find_entity_rule(rule).made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
+    made: list[Any] = [find_rule(settings).factory for settings in world_rules(spec).values()]
+    made += [
+        find_entity_rule(rule).factory for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()
+    ]
     own = {name: kind for one in dict.fromkeys(made) for name, kind in one.mark_kinds.items()}
     return {FAILED: FAILED_LOOK, **({EVENT: EVENT_LOOK} if spec.events else {}), **own}
 
@@ -214,7 +216,7 @@ def _marks_of(rule: Any, before: Frame, after: Frame) -> list[Marked]:
     found = [*rule.marks(before, after)]
     for mark in found:
         if not (isinstance(mark, tuple) and [*map(type, mark)] == [int, str, str]):
-            raise WrongResult(rule.marks, "a mark (tick, kind, text)", mark)
+            raise ContractError(rule.marks, "a mark (tick, kind, text)", mark)
     return found
 
 
@@ -228,7 +230,7 @@ class World:
         self._rules = rules_of(spec, layout)
         self.has_rules = bool(self._rules)
         fitted = {robot.index: actuators_of(spec, layout, robot) for robot in layout.robots}
-        self.actuators: Mapping[int, tuple[FittedActuator, ...]] = {
+        self.actuators: Mapping[int, tuple[BoundActuator, ...]] = {
             index: actuators for index, actuators in fitted.items() if actuators
         }
         """What moves each robot that has actuators, by the entity's index."""
@@ -279,13 +281,13 @@ class World:
 
     def _watch(self) -> None:
         """Give all forms numbers of the frame that they can only read."""
-        self.models = {index: watched(model) for index, model in self.models.items()}
-        self._rules = {label: watched(rule) for label, rule in self._rules.items()}
-        self.actuators = {index: tuple(map(watched_actuator, its)) for index, its in self.actuators.items()}
+        self.models = {index: guarded(model) for index, model in self.models.items()}
+        self._rules = {label: guarded(rule) for label, rule in self._rules.items()}
+        self.actuators = {index: tuple(map(guarded_actuator, its)) for index, its in self.actuators.items()}
         self._only = {index: self.actuators[index][0] for index in self._only}
-        self._motions = {kind: watched(motion) for kind, motion in self._motions.items()}
+        self._motions = {kind: guarded(motion) for kind, motion in self._motions.items()}
         self._entity_rules = {
-            index: tuple((label, watched(rule)) for label, rule in its) for index, its in self._entity_rules.items()
+            index: tuple((label, guarded(rule)) for label, rule in its) for index, its in self._entity_rules.items()
         }
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
@@ -386,7 +388,7 @@ class World:
             try:
                 answer = rule.has_power(view)
                 if answer is not True and answer is not False:
-                    raise WrongResult(rule.has_power, "True or False", answer)
+                    raise ContractError(rule.has_power, "True or False", answer)
             except BaseException as error:
                 raise component_error(f"rule {label}", entity.name, view.tick, error) from error
             if not answer:
@@ -416,7 +418,7 @@ class World:
             count = entity.counts.get("joint_positions") if entity.is_rigid else None
             what = "a tuple of (target, greatest force)" + ("" if count is None else f" for {count} motors")
             if not are_motors(motors, count):
-                error = WrongResult(actuators[0].actuator.command, what, motors)
+                error = ContractError(actuators[0].actuator.command, what, motors)
                 raise actuators[0].failed(tick, error) from error
 
     def _motors_of_several(self, entity: Entity, view: View) -> Motors:
@@ -483,23 +485,23 @@ class World:
         try:
             is_plausible = check(numbers, before)
             if is_plausible is not True and is_plausible is not False:
-                raise WrongResult(check, "True or False", is_plausible)
+                raise ContractError(check, "True or False", is_plausible)
         except BaseException as error:
             raise component_error(f"model {entity.model}", entity.name, tick, error) from error
         return "" if is_plausible else "its new state is not within its bounds, speed limits and reach"
 
-    def stir(self, numbers: list[float]) -> None:
+    def excite(self, numbers: list[float]) -> None:
         """Set a world at rest in motion, for the fixed small run that tells engines apart. Raises ComponentError."""
         view = WritableView(0, numbers)
         for index, model in self.models.items():
             entity = self._layout.entities[index]
             if not entity.is_absent(numbers):
-                called(f"model {entity.model}", entity.name, 0, model.stir, view)
+                called(f"model {entity.model}", entity.name, 0, model.excite, view)
         for index, fitted in self.actuators.items():
             if self._layout.entities[index].is_absent(numbers):
                 continue
             for one in fitted:
-                called(f"actuator {one.channel}", one.robot, 0, one.actuator.stir, view)
+                called(f"actuator {one.channel}", one.robot, 0, one.actuator.excite, view)
 
 
 def _by_motion(entities: Iterable[Entity]) -> dict[type[Motion], list[Entity]]:
@@ -529,12 +531,12 @@ def asked_together(what: str, together: Any, count: int, view: View) -> NDArray[
         asked = together.command(view)
         if isinstance(asked, np.ndarray) and asked.dtype == np.float64 and asked.shape[0::2] == (count, 2):
             return asked
-        raise WrongResult(together.command, f"an array of float64 of the shape ({count}, motors, 2)", asked)
+        raise ContractError(together.command, f"an array of float64 of the shape ({count}, motors, 2)", asked)
     except BaseException as error:
         raise component_error(what, "", view.tick, error) from error
 
 
-def _without_power(one: FittedActuator, view: View) -> Motors:
+def _without_power(one: BoundActuator, view: View) -> Motors:
     """Return what an actuator asks of its motors where there is no power: to stand still, with all their force."""
     asked = one.actuator.unpowered()
     return tuple((0.0, motor[1]) for motor in one.actuator.command(view)) if asked is None else asked
@@ -559,9 +561,9 @@ def entity_rules_of(
     rules = []
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
         found: Any = find_entity_rule(settings)
-        if hook and not overrides(found.made, hook):
+        if hook and not overrides(found.factory, hook):
             continue
         key = draw_key(spec.seed, "entity_rule", robot.name, label)
         at = Mounting(spec, layout, robot, label, key, frozenset(found.written))
-        rules.append((label, called(f"rule {label}", robot.name, 0, found.made, settings, at)))
+        rules.append((label, called(f"rule {label}", robot.name, 0, found.factory, settings, at)))
     return tuple(rules)

@@ -116,7 +116,7 @@ class Actuator(Component):
     def hold(self, view: WritableView) -> None:
         """Ask for the present state from now on: the robot goes out of service, or comes back, or its job ended."""
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Ask for some motion, for the fixed small run that tells engines apart."""
 
     def wrench(self, view: View) -> tuple[Vector, Vector] | None:
@@ -185,7 +185,7 @@ class Model(Component):
         """Return what is wrong with a state that no run should come to; empty if nothing is."""
         return ""
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Set it in motion, for the fixed small run that tells engines apart."""
 
     def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:

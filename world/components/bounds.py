@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import msgspec
 
 from foosim.world.components.base import overrides
-from foosim.world.forms.failures import WrongResult
+from foosim.world.forms.failures import ContractError
 from foosim.world.forms.payloads import Field, PayloadCodec, field_at
 
 Bound: TypeAlias = tuple[float, float]
@@ -30,11 +30,13 @@ NONE_CLAMPED: Final[Sequence[Clamped]] = ()
 
 
 def limits_of(made: Any, fields: Sequence[Field]) -> Mapping[str, Bound]:
-    """Return the least and the greatest value of fields of a component's values. Raises WrongResult."""
+    """Return the least and the greatest value of fields of a component's values. Raises ContractError."""
     limits = made.limits()
     names = [field.name for field in fields]
     if not (isinstance(limits, Mapping) and {*limits} <= {*names} and all(map(_is_bound, limits.values()))):
-        raise WrongResult(made.limits, f"a mapping of fields ({', '.join(names)}) to least and greatest value", limits)
+        raise ContractError(
+            made.limits, f"a mapping of fields ({', '.join(names)}) to least and greatest value", limits
+        )
     return limits
 
 
@@ -55,7 +57,7 @@ class CommandBounds:
     """The limits of one actuator. What it keeps follows from the actuator."""
 
     def __init__(self, made: Any, codec: PayloadCodec) -> None:
-        """Raises WrongResult for limits that are none."""
+        """Raises ContractError for limits that are none."""
         self._made, self._codec, self._limits = made, codec, limits_of(made, codec.fields)
         self._within: Callable[[Any], Any] | None = made.within if overrides(type(made), "within") else None
         self._size = -1

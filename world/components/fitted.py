@@ -22,17 +22,17 @@ from foosim.world.components.view import (
     component_error,
 )
 from foosim.world.forms import registry
-from foosim.world.forms.failures import WrongResult
+from foosim.world.forms.failures import ContractError
 from foosim.world.forms.forms import SAMPLES, Component
 from foosim.world.forms.payloads import FLOAT, PayloadCodec, as_floats
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
-from foosim.world.layout import Entity, Layout, modifier_labels, slot_that_speaks
+from foosim.world.layout import Entity, Layout, modifier_labels, trigger_slot
 from foosim.world.spec import WorldSpec
 
 
 @dataclass(frozen=True, slots=True)
-class FittedModifier:
+class BoundModifier:
     """A modifier of one sensor or actuator: its name, and which robot's it is, for messages."""
 
     what: str
@@ -64,7 +64,7 @@ class FittedModifier:
                 floats = values if FLOAT.issuperset(map(type, values)) else as_floats(values)
                 if floats is not None:
                     return floats
-            raise WrongResult(call, f"a list of {size} numbers, or None", values)
+            raise ContractError(call, f"a list of {size} numbers, or None", values)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
 
@@ -74,7 +74,7 @@ class FittedModifier:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FittedSensor:
+class BoundSensor:
     """A sensor of one robot: the channel of its readings, its schedule (`spec.Schedule`) number by number,
     which is read at each tick, and the slot that counts them."""
 
@@ -86,16 +86,16 @@ class FittedSensor:
     samples_at: int
     sensor: Sensor
     codec: PayloadCodec
-    modifiers: tuple[FittedModifier, ...]
+    modifiers: tuple[BoundModifier, ...]
     size: int
     """How many numbers a reading has; 0 of one that is not all numbers."""
-    speaks_at: int = -1
+    trigger_at: int = -1
     """The place of the number that makes it measure where it is not 0; -1 without one."""
 
     def is_due(self, tick: int, numbers: Sequence[float]) -> bool:
         """Whether it measures at a tick, at whose start the numbers of the frame are these."""
         return (tick * self.step + self.shift) % self.period < self.step or (
-            self.speaks_at >= 0 and numbers[self.speaks_at] != 0.0
+            self.trigger_at >= 0 and numbers[self.trigger_at] != 0.0
         )
 
     def sample(self, view: WritableView) -> Any:
@@ -105,7 +105,7 @@ class FittedSensor:
         except BaseException as error:
             raise self.failed(view.tick, error) from error
         if not isinstance(reading, self.codec.kind):
-            wrong = WrongResult(self.sensor.sample, f"a {self.codec.kind.__name__}", reading)
+            wrong = ContractError(self.sensor.sample, f"a {self.codec.kind.__name__}", reading)
             raise self.failed(view.tick, wrong) from wrong
         return reading
 
@@ -115,14 +115,14 @@ class FittedSensor:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FittedActuator:
+class BoundActuator:
     """An actuator of one robot, and the channel of its commands."""
 
     robot: str
     channel: str
     actuator: Actuator
     codec: PayloadCodec
-    modifiers: tuple[FittedModifier, ...]
+    modifiers: tuple[BoundModifier, ...]
     size: int
     """How many numbers a command has; 0 of one that is not all numbers."""
     bounds: CommandBounds
@@ -211,7 +211,7 @@ class FittedActuator:
                 if is_taken and clamped:
                     view.written_to[self.clamped_at] += 1.0
                 return is_taken
-            raise WrongResult(self.actuator.accept, "True or False", is_taken)
+            raise ContractError(self.actuator.accept, "True or False", is_taken)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
 
@@ -231,7 +231,7 @@ class FittedActuator:
 # --- making ----------------------------------------------------------------------------------------------------------
 
 
-def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSensor, ...]:
+def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[BoundSensor, ...]:
     """Return the sensors of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].sensors.items()):
@@ -241,9 +241,9 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
         sensor = _made(component, settings, mounting)
         of_values = _spacing(spec, component, settings)
         modifiers = tuple(_modifiers(component, settings, mounting, sensor, of_values))
-        numbers, speaks = numbers_of(component, settings, robot.counts), component.speaks_by(settings)
+        numbers, trigger = numbers_of(component, settings, robot.counts), component.trigger_by(settings)
         fitted.append(
-            FittedSensor(
+            BoundSensor(
                 robot.name,
                 channel,
                 *spec.schedule(settings),
@@ -252,13 +252,13 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
                 codec_of(settings.kind, "sensor"),
                 modifiers,
                 0 if numbers is None else numbers.size,
-                robot.offsets[slot_that_speaks(robot, channel, speaks)] if speaks else -1,
+                robot.offsets[trigger_slot(robot, channel, trigger)] if trigger else -1,
             )
         )
     return tuple(fitted)
 
 
-def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedActuator, ...]:
+def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[BoundActuator, ...]:
     """Return the actuators of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].actuators.items()):
@@ -273,7 +273,7 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         counter = robot.offsets["clamped"]
         joints = called(f"actuator {channel}", robot.name, 0, _joints, component, settings, mounting)
         fitted.append(
-            FittedActuator(
+            BoundActuator(
                 robot.name,
                 channel,
                 made,
@@ -298,7 +298,7 @@ def _joints(component: Component, settings: ActuatorSettings, mounting: Mounting
 
 def _made(component: Component, settings: ComponentSettings, mounting: Mounting | ModifierMounting) -> Any:
     at = mounting if isinstance(mounting, Mounting) else mounting.mounting
-    return called(f"{component.form} {at.name}", at.robot.name, 0, component.made, settings, mounting)
+    return called(f"{component.type_name} {at.name}", at.robot.name, 0, component.factory, settings, mounting)
 
 
 class Spacing(NamedTuple):
@@ -309,8 +309,8 @@ class Spacing(NamedTuple):
 
 
 def _spacing(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> Spacing:
-    """Return that of a sensor's readings; one that speaks may have one at each tick."""
-    if sensor.speaks:
+    """Return that of a sensor's readings; one with a trigger may have one at each tick."""
+    if sensor.trigger:
         return Spacing(1, spec.tick_ns / 1e9)
     return Spacing(spec.schedule(settings).least_ticks, float(1 / settings.rate_hz))
 
@@ -321,7 +321,7 @@ def _modifiers(
     mounting: Mounting,
     made: Any,
     of_values: Spacing,
-) -> Iterator[FittedModifier]:
+) -> Iterator[BoundModifier]:
     """Yield the modifiers of a component's readings or commands, in order; their draws are keyed by their names."""
     if not settings.modifiers:
         return
@@ -329,14 +329,14 @@ def _modifiers(
     assert numbers is not None, "checked with the deployment"
     spec, robot, channel = mounting.spec, mounting.robot, mounting.name
     limits = NO_LIMITS
-    if component.form == "sensor":
+    if component.type_name == "sensor":
         limits = called(f"sensor {channel}", robot.name, 0, limits_of, made, numbers.fields)
     bounds = [limits.get(numbers.field(place).name, (-inf, inf)) for place in range(numbers.size)]
     low, high = tuple(least for least, _ in bounds), tuple(most for _, most in bounds)
     for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):
-        key = draw_key(spec.seed, component.form, robot.name, channel, label)
+        key = draw_key(spec.seed, component.type_name, robot.name, channel, label)
         own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key, is_owners=mounting.is_owners)
         at = ModifierMounting(own, numbers, low, high, spec.tick_ns, of_values.period_s, of_values.least_ticks, key)
         one = _made(registry.find_component("modifier", its.kind), its, at)
         waits = overrides(type(one), "due")
-        yield FittedModifier(f"modifier {label} of {channel}", robot.name, one, waits)
+        yield BoundModifier(f"modifier {label} of {channel}", robot.name, one, waits)

@@ -108,7 +108,7 @@ def free_poses(state: Floats, back: Floats, centres: Floats) -> tuple[Floats, Fl
 
 def body_at(at: Mounting) -> Body:
     """Return the body of the robot that a component is on. Raises Misfit for one without."""
-    model = at.robot.kind.made(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
+    model = at.robot.kind.factory(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
     body: Body | None = model.body()
     if body is None:
         raise Misfit(("kind",), f"{at.robot.name} has no body to carry it", at.robot.model)

@@ -156,29 +156,29 @@ def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sen
     return found  # type: ignore[no-any-return]
 
 
-SpeaksOf: TypeAlias = Callable[[Any], str]
+TriggerOf: TypeAlias = Callable[[Any], str]
 """What makes a sensor measure besides its rate, by its settings."""
-SeveralOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
+ArrayLengthOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
 """How many numbers the last fields of a reading have, by the settings and by how many each field of the robot has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Form:
+class ComponentType:
     """A registered class: its form and name, the class, and the model of its settings.
 
     `kit` is the section that a deployment must have, empty where any world will do.
     """
 
-    form: str
+    type_name: str
     name: str
-    made: Callable[..., Any]
+    factory: Callable[..., Any]
     settings: type[SpecBase]
     kit: str = ""
 
     @property
     def module(self) -> str:
         """The module that it is in."""
-        return self.made.__module__
+        return self.factory.__module__
 
     @property
     def is_own(self) -> bool:
@@ -188,21 +188,21 @@ class Form:
     @property
     def summary(self) -> str:
         """The first line of its docstring."""
-        return (self.made.__doc__ or "").strip().partition("\n")[0]
+        return (self.factory.__doc__ or "").strip().partition("\n")[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Component(Form):
+class Component(ComponentType):
     """A sensor, actuator or modifier.
 
     `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers that it remembers, by
     field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
-    that the model of its robot must have. `several` is the setting that says how many numbers the last field of a
+    that the model of its robot must have. `array_length` is the setting that says how many numbers the last field of a
     reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
     `moves` says that an actuator commands the motors of its robot, `joints` which: it is the setting that names their
     joints, in the order of what the actuator asks. All are meant without such a setting, and where that is None. No
     motor is commanded by two actuators. `jobs` says that its commands may be jobs (`forms.jobs`).
-    `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
+    `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0; or a function that says it, which may name a slot of an actuator.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
@@ -212,8 +212,8 @@ class Component(Form):
     value: type[Struct] | None = None
     slots: Mapping[str, int] | SlotsOf = field(default_factory=dict)
     needs: tuple[str, ...] = ()
-    several: str | SeveralOf = ""
-    speaks: str | SpeaksOf = ""
+    array_length: str | ArrayLengthOf = ""
+    trigger: str | TriggerOf = ""
     shown_as: str = ""
     moves: bool = False
     joints: str = ""
@@ -225,11 +225,11 @@ class Component(Form):
         follow from them."""
         if not callable(self.slots):
             return self.slots
-        return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.form == "sensor")
+        return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.type_name == "sensor")
 
-    def speaks_by(self, settings: Any) -> str:
+    def trigger_by(self, settings: Any) -> str:
         """Return what makes a sensor with these settings measure besides its rate; empty for nothing."""
-        return self.speaks(settings) if callable(self.speaks) else self.speaks
+        return self.trigger(settings) if callable(self.trigger) else self.trigger
 
     def joints_named(self, settings: Any) -> Sequence[str] | None:
         """Return the joints that an actuator with these settings commands; None for all. Raises BadValue."""
@@ -240,7 +240,7 @@ class Component(Form):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Model(Form):
+class Model(ComponentType):
     """A model of entities.
 
     `slots` are the fields of its state, or a function of settings and world that returns them. Those that foosim itself
@@ -321,7 +321,7 @@ class Model(Form):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WorldRule(Form):
+class WorldRule(ComponentType):
     """What a world does by itself, before a tick is solved.
 
     `slots` are what it remembers, as `NAME.FIELD` of the entity `world`, NAME being that of the rule in its world;
@@ -336,7 +336,7 @@ class WorldRule(Form):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EntityRule(Form):
+class EntityRule(ComponentType):
     """What an entity does by itself, after it was solved, computed by the node that solves it.
 
     `slots` are what it remembers, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` those
@@ -388,12 +388,12 @@ ENGINES: Final[dict[str, Engine]] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene(Form):
+class Scene(ComponentType):
     """Scenery that never moves, made from settings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kit(Form):
+class Kit(ComponentType):
     """A section of a deployment that makes a world from few numbers.
 
     `entities` are what is in the world beside the robots, their models by name; `spares` returns the same of what is

@@ -91,14 +91,14 @@ def numbers_of(
 
     `counts` are how many numbers the fields of its robot have.
     """
-    fields = codec_of(component.name, component.form).fields
+    fields = codec_of(component.name, component.type_name).fields
     many = many_of(fields)
-    if not all(field.is_number for field in fields[: len(fields) - many]) or (many and not component.several):
+    if not all(field.is_number for field in fields[: len(fields) - many]) or (many and not component.array_length):
         return None
     size = len(fields) - many
     if many:
-        several = component.several
-        size += many * (several(settings, counts) if callable(several) else getattr(settings, several))
+        length = component.array_length
+        size += many * (length(settings, counts) if callable(length) else getattr(settings, length))
     return Numbers(fields, getattr(component.value, GROUPS, {}), size)
 
 
@@ -110,12 +110,12 @@ def payload_bytes(component: Component, settings: ComponentSettings, counts: Map
     numbers = numbers_of(component, settings, counts)
     if numbers is not None:
         return 8 * numbers.size
-    codec = codec_of(component.name, component.form)
+    codec = codec_of(component.name, component.type_name)
     if codec.size is not None:
         return codec.size
     many = many_of(codec.fields)
     singles = codec.fields[: len(codec.fields) - many]
-    is_of_joints = component.form == "actuator" and "joint_positions" in component.needs
+    is_of_joints = component.type_name == "actuator" and "joint_positions" in component.needs
     if not is_of_joints or not all(field.is_number for field in singles):
         return None
     joints = len(component.joints_named(settings) or ()) or counts["joint_positions"]

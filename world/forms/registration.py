@@ -38,7 +38,7 @@ TYPES: Final[Mapping[str, Any]] = {
 
 def check_form(found: Any) -> None:
     """Refuse a component whose description cannot be so. Raises Refused."""
-    word, name = word_of(found.form), found.name
+    word, name = word_of(found.type_name), found.name
     if not (isinstance(name, str) and is_name(name)):
         raise Refused(f"{found.module} registers {with_article(word)} as {name!r}: {NAME_RULE}")
     problem = next(_problems(found), "")
@@ -48,9 +48,9 @@ def check_form(found: Any) -> None:
 
 def _problems(found: Any) -> Iterator[str]:
     """Yield what is wrong with a description. Each field is read only where those before it are right."""
-    wanted, base, settings = CLASSES.get(found.form), BASES.get(found.form, SpecBase), found.settings
-    if wanted is not None and isinstance(found.made, type) and not issubclass(found.made, wanted):
-        yield f"the class {found.made.__name__} is not derived from {wanted.__name__} of foosim.components"
+    wanted, base, settings = CLASSES.get(found.type_name), BASES.get(found.type_name, SpecBase), found.settings
+    if wanted is not None and isinstance(found.factory, type) and not issubclass(found.factory, wanted):
+        yield f"the class {found.factory.__name__} is not derived from {wanted.__name__} of foosim.components"
     if not (isinstance(settings, type) and issubclass(settings, base)):
         yield f"its settings are a class derived from {base.__name__}, not {_shown(settings)}"
     for key, kind in TYPES.items():
@@ -74,7 +74,7 @@ def _problems(found: Any) -> Iterator[str]:
 def _settings_named(found: Any) -> Iterator[str]:
     """Yield the names of settings that there are not."""
     fields = found.settings.model_fields
-    for key in ("several", "joints"):
+    for key in ("array_length", "joints"):
         name = getattr(found, key, "")
         if isinstance(name, str) and name and name not in fields:
             yield f"{key} names no setting, {show(name)}"
@@ -86,7 +86,7 @@ def _settings_named(found: Any) -> Iterator[str]:
 
 def _values(found: Any) -> Iterator[str]:
     """Yield what is wrong with the type of readings or commands."""
-    word = VALUES.get(found.form)
+    word = VALUES.get(found.type_name)
     if word is None:
         return
     if not (isinstance(found.value, type) and issubclass(found.value, msgspec.Struct)):
@@ -110,9 +110,9 @@ def _values(found: Any) -> Iterator[str]:
 
 
 def _slots(found: Any, key: str, slots: Any) -> Iterator[str]:
-    if callable(slots) and found.form in ("model", "sensor", "actuator", "modifier"):
+    if callable(slots) and found.type_name in ("model", "sensor", "actuator", "modifier"):
         return
-    problem = slots_problem(slots, is_sensor=found.form == "sensor")
+    problem = slots_problem(slots, is_sensor=found.type_name == "sensor")
     if problem:
         yield f"{key}: {problem}"
     for slot in (*OF_ROBOTS, *OF_SOLVED) if isinstance(found, forms.Model) else ():
@@ -142,7 +142,7 @@ def _settable(found: Any) -> Iterator[str]:
             yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
         elif isinstance(found, forms.Model) and name in SET_BY_FOOSIM:
             yield f"settable: {name} is set by foosim itself"
-        elif not overrides(found.made, "set") and not callable(found.slots) and found.slots.get(name) != 1:
+        elif not overrides(found.factory, "set") and not callable(found.slots) and found.slots.get(name) != 1:
             yield f"settable: {name} is no slot of one number, and the class has no method set"
 
 

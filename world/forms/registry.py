@@ -23,9 +23,9 @@ from foosim.world.forms.failures import failure_of, in_library
 from foosim.world.forms.forms import (
     ENGINES,
     Component,
+    ComponentType,
     Engine,
     EntityRule,
-    Form,
     Kit,
     Model,
     Scene,
@@ -69,7 +69,7 @@ class Decorator(Protocol):
     def __call__(self, made: Made, /) -> Made: ...
 
 
-_known: Final[dict[tuple[str, str], Form]] = {}
+_known: Final[dict[tuple[str, str], ComponentType]] = {}
 _loaded: Final[dict[str, str]] = {}
 """Of each entry point that was loaded: why that failed, empty if it did not."""
 
@@ -97,7 +97,7 @@ def model(name: str, settings: type[EntitySettings], **about: Any) -> Decorator:
 
     The fields that foosim itself needs, and that it does not declare, come after those that it does. `variants` are
     classes of the same module by the value of the setting `dynamics`, each with the fields that differ:
-    `{"rigid": {"made": Rigid, "is_rigid": True, ...}}`.
+    `{"rigid": {"factory": Rigid, "is_rigid": True, ...}}`.
     """
     return _registering(Model, "model", name, settings, **about)
 
@@ -126,14 +126,14 @@ def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
 
 def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **about: Any) -> Decorator:
     def register(made: Made) -> Made:
-        found = _described(kind, {"form": form, "name": name, "made": made, "settings": settings, **about})
+        found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **about})
         check_form(found)
         key = form, name
         own = own_module(*key)
         if found.module != own and _is_there(*key):
             raise Refused(f"{form} {name} is registered by {found.module}, and is in {own}")
         first = _known.setdefault(key, found)
-        if (first.module, first.made.__qualname__) != (found.module, made.__qualname__):
+        if (first.module, first.factory.__qualname__) != (found.module, made.__qualname__):
             raise Refused(f"{form} {name} is registered by {first.module} and {found.module}")
         _known[key] = found
         return made
@@ -157,7 +157,7 @@ def _described(kind: type[Any], about: dict[str, Any]) -> Any:
 # --- finding ---------------------------------------------------------------------------------------------------------
 
 
-def find(form: str, kind: str) -> Form:
+def find(form: str, kind: str) -> ComponentType:
     """Return what a deployment calls `kind`: a registered name, or `module:Class`.
 
     Raises UnknownName, which says what is nearest, and BadValue for a module that cannot be imported, or a class in it
@@ -175,7 +175,7 @@ def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
     return UnknownName("; ".join([f"unknown {word_of(form)}", *load_entry_points()]), kind, choices, *others)
 
 
-def lookup(form: str, kind: str) -> Form | None:
+def lookup(form: str, kind: str) -> ComponentType | None:
     """Return what `find` does, or None where nothing has that name; raises BadValue for a class as `find` does."""
     if ":" in kind:
         return _of_class(form, kind)
@@ -260,7 +260,7 @@ def _load(entry: EntryPoint) -> str:
     return ""
 
 
-def _own(form: str, name: str) -> Form | None:
+def _own(form: str, name: str) -> ComponentType | None:
     """Return one of foosim's own, imported from its module; None where there is none."""
     if _is_there(form, name):
         import_module(own_module(form, name))
@@ -333,19 +333,19 @@ def _not_found(path: str, missing: str) -> BadValue:
     return BadValue(f"there is no module {missing}{hint}", path, quoted(found))
 
 
-def _of_class(form: str, path: str) -> Form:
+def _of_class(form: str, path: str) -> ComponentType:
     """Return the one that `module:Class` registered."""
     made, module = class_at(path), path.partition(":")[0]
-    of_form = [one for one in _known.values() if one.form == form]
+    of_form = [one for one in _known.values() if one.type_name == form]
     for one in of_form:
-        if one.made is made:
+        if one.factory is made:
             return one
-    there = sorted(one.made.__qualname__ for one in of_form if one.module == module)
+    there = sorted(one.factory.__qualname__ for one in of_form if one.module == module)
     hint = f"; {module} registers {', '.join(there)}" if there else ""
     raise BadValue(f"not registered as {with_article(word_of(form))}{hint}", path)
 
 
-def _forget_new(known: Mapping[tuple[str, str], Form]) -> None:
+def _forget_new(known: Mapping[tuple[str, str], ComponentType]) -> None:
     """Forget what modules have registered that then could not be imported; what they imported before stays."""
     for key in _known.keys() - known.keys():
         if _known[key].module not in sys.modules:

@@ -74,7 +74,7 @@ class Ball(Model):
             valid = f"valid are x up to {x:g} m and y up to {y:g} m from the middle, z above 0 m up to {z:g} m"
             raise BadValue(f"a place outside of the table: {valid}", ", ".join(f"{value:g} m" for value in position))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Kick it, for the small run that tells engines apart."""
         view.write(self._at.slot("linear_velocity"), 1.0, 0.3, 0.0)
 

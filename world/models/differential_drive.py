@@ -180,7 +180,7 @@ class RigidDifferentialDrive(Model):
     units={"heading": ("rad",), "wheel_speeds": ("m/s",), "wheel_travel": ("m",)},
     variants={
         "rigid": {
-            "made": RigidDifferentialDrive,
+            "factory": RigidDifferentialDrive,
             "slots": {**RIGID, **dict.fromkeys(JOINTS, 2), **WHEELS},
             "is_rigid": True,
             "motion": None,

@@ -113,7 +113,7 @@ class Urdf(Model):
             view.write(at.slot("joint_positions"), *[_start(link) for link in body.joints])
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Set it in motion, for the small run that tells engines apart."""
         if self._body.is_free:
             view.write(self._at.slot("linear_velocity"), 0.5, 0.2, 0.0)

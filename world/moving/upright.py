@@ -30,7 +30,7 @@ class Upright:
 
 def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
     """Return an entity as its model."""
-    return entity.kind.made(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
+    return entity.kind.factory(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
 
 
 def stands_upright(settings: EntitySettings) -> bool:
@@ -39,7 +39,7 @@ def stands_upright(settings: EntitySettings) -> bool:
     return (
         model.motion is not None
         and not model.kit
-        and overrides(model.made, "upright")
+        and overrides(model.factory, "upright")
         and "position" in (model.declared or ())
     )
 

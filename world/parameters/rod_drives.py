@@ -110,8 +110,8 @@ class RodSetPoint(Actuator):
 
     steady: ClassVar = True
     """What it asks follows from the state of its rod alone."""
-    stirs: ClassVar = (0.1, 0.5)
-    """Shares of the bounds that `stir` asks for."""
+    excites: ClassVar = (0.1, 0.5)
+    """Shares of the bounds that `excite` asks for."""
 
     def __init__(self, at: Mounting, bounds: tuple[float, float]) -> None:
         """`bounds` are the greatest numbers of slide and spin in either direction, in the units of the command."""
@@ -131,6 +131,6 @@ class RodSetPoint(Actuator):
         """Ask for nothing: a speed of 0, no force, or motors that are shorted, which brakes them."""
         view.write(self._set_point, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Slide and turn, for the small run that tells engines apart."""
-        view.write(self._set_point, *[share * most for share, most in zip(self.stirs, self._bounds, strict=True)])
+        view.write(self._set_point, *[share * most for share, most in zip(self.excites, self._bounds, strict=True)])

@@ -34,7 +34,7 @@ class Jobs(Struct, frozen=True):
     states: tuple[Count, ...]
 
 
-@sensor("job", JobSettings, Jobs, speaks=lambda settings: f"{settings.actuator}.{CHANGED}")
+@sensor("job", JobSettings, Jobs, trigger=lambda settings: f"{settings.actuator}.{CHANGED}")
 class JobSensor(Sensor):
     """Whose job an actuator does, and the last job of each sender, with how it stands."""
 

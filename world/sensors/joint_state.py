@@ -45,7 +45,7 @@ def joints_of(settings: JointStateSettings, counts: Mapping[str, int]) -> int:
     return len(settings.joints) or counts["joint_positions"]
 
 
-@sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, several=joints_of)
+@sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, array_length=joints_of)
 class JointStates(Sensor):
     """Positions, velocities and efforts of joints."""
 

@@ -61,7 +61,7 @@ class Scan(Struct, frozen=True):
     distances: Annotated[tuple[Metres, ...], Meta(min_length=1, max_length=RAYS_MAX)]
 
 
-@sensor("laser_scanner", LaserScannerSettings, Scan, several="rays", shown_as="foxglove.LaserScan")
+@sensor("laser_scanner", LaserScannerSettings, Scan, array_length="rays", shown_as="foxglove.LaserScan")
 class LaserScanner(Sensor):
     """The distance to what each beam meets, the robot's own body aside; the range where that is nothing."""
 

@@ -46,7 +46,7 @@ class Ranges(Struct, frozen=True):
     ways: Annotated[tuple[Metres, ...], Meta(min_length=1, max_length=RAYS_MAX)]
 
 
-@sensor("proximity", ProximitySettings, Ranges, several="rays")
+@sensor("proximity", ProximitySettings, Ranges, array_length="rays")
 class Proximity(Sensor):
     """The free way from the hull along each ray; the sensor's range where nothing is hit."""
 

@@ -22,7 +22,7 @@ from foosim.world.components.base import overrides
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Set, write, written
-from foosim.world.forms.failures import WrongResult
+from foosim.world.forms.failures import ContractError
 from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import (
@@ -99,7 +99,7 @@ def _is_placed(spec: WorldSpec, entity: Entity) -> bool:
     if "position" not in entity.fields:
         return False
     settings = spec.settings_of(entity.name)
-    return overrides(entity.kind.made, "place_at") if settings is None else is_placed(type(settings))
+    return overrides(entity.kind.factory, "place_at") if settings is None else is_placed(type(settings))
 
 
 def set_edits(
@@ -162,7 +162,7 @@ def _of_component(
     for slot, numbers in ask(name, number).items():
         field = _field(label, slot) if _field(label, slot) in entity.offsets else slot
         if entity.counts.get(field) != len(numbers) or not all(map(isfinite, numbers)):
-            raise WrongResult(ask, "finite numbers by slot, as many as each has", {slot: numbers})
+            raise ContractError(ask, "finite numbers by slot, as many as each has", {slot: numbers})
         found.append(Set(entity.name, field, [*map(float, numbers)]))
     return found
 
@@ -199,10 +199,10 @@ def _place(spec: WorldSpec, layout: Layout, entity: Entity, pose: Pose, view: Wr
     """Write the state of an entity that starts with a pose. What has no settings is put by its model's `place_at`."""
     what, at = f"model {entity.model}", mounting_of(spec, layout, entity)
     if spec.settings_of(entity.name) is not None:
-        made: Any = called(what, entity.name, 0, entity.kind.made, _elsewhere(spec, entity, pose), at)
+        made: Any = called(what, entity.name, 0, entity.kind.factory, _elsewhere(spec, entity, pose), at)
         called(what, entity.name, 0, made.place, view)
         return
-    made = called(what, entity.name, 0, entity.kind.made, None, at)
+    made = called(what, entity.name, 0, entity.kind.factory, None, at)
     made.check_place(pose.position)
     called(what, entity.name, 0, made.place_at, view, pose.position)
 

@@ -65,7 +65,7 @@ class JointPositionActuator(Actuator):
         """Make the present positions the set-points."""
         view.write(self._group.set_point, *self._group.positions(view))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Move each joint by a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 

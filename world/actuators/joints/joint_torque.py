@@ -56,7 +56,7 @@ class JointTorqueActuator(Actuator):
         """Let the joints go."""
         view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Push each joint a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[min(0.01, force) for force in self._group.forces])
 

@@ -160,7 +160,7 @@ class JointTrajectory(Actuator):
         view.write(self._count, 0.0)
         view.write(self._group.set_point, *self._group.positions(view))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Move each joint by a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 

@@ -61,7 +61,7 @@ class JointVelocityActuator(Actuator):
         """Stop the joints."""
         view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn each joint a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[0.2] * self._group.set_point.size)
 

@@ -91,7 +91,7 @@ class LookAt(Actuator):
         view.write(self._group.set_point, *self._group.positions(view))
         self._progress.begin(view)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[angle + 0.2 for angle in self._group.positions(view)])
 

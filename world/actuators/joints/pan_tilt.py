@@ -61,7 +61,7 @@ class PanTilt(Actuator):
         """Stay at the present angles."""
         self._set(view, self.group.positions(view))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn a little, for the small run that tells engines apart."""
         self._set(view, [angle + 0.2 for angle in self.group.positions(view)])
 

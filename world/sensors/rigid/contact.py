@@ -26,7 +26,7 @@ class Touches(Struct, frozen=True):
     substep: Count
 
 
-@sensor("contact", ContactSettings, Touches, needs=("contacts",), speaks="contacts")
+@sensor("contact", ContactSettings, Touches, needs=("contacts",), trigger="contacts")
 class ContactSensor(Sensor):
     """Touches of a robot in the last tick: how many began, their impulse, the last substep with one."""
 

@@ -52,8 +52,8 @@ def _touches(settings: FigureContactSettings, counts: Mapping[str, int]) -> int:
     FigureContactSettings,
     FigureTouches,
     needs=(*TOUCHES,),
-    speaks="touches",
-    several=_touches,
+    trigger="touches",
+    array_length=_touches,
     kit="table",
 )
 class FigureContact(Sensor):
