@@ -15,7 +15,7 @@ from foosim.world.components.base import Actuator, EntityRule, Kit, Model, Modif
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.surroundings import Surroundings
-from foosim.world.components.view import Misfit, ModifierMounting, Mounting, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, ModifierMounting, Mounting, View, WritableView
 from foosim.world.forms.forms import ROBOTS, Carrier
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import PerField
@@ -76,6 +76,7 @@ __all__ = [
     "Finding",
     "Force",
     "Frame",
+    "IncompatibleComponent",
     "JobNumber",
     "JobState",
     "Judged",
@@ -85,7 +86,6 @@ __all__ = [
     "MarkKind",
     "Marked",
     "Mass",
-    "Misfit",
     "Model",
     "Modifier",
     "ModifierMounting",

@@ -9,7 +9,7 @@ from foosim.common.exact_math import atan2, cos, hypot, sin
 from foosim.common.spec_base import Length, default
 from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
-from foosim.world.components.view import Misfit, Mounting, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.quantities import JobNumber, Metres
 from foosim.world.forms.registry import actuator
@@ -65,10 +65,12 @@ class GoTo(Actuator):
 
     @staticmethod
     def check(settings: GoToSettings, at: Mounting) -> None:
-        """Raise Misfit for a robot that neither has wheels nor goes in any direction."""
+        """Raise IncompatibleComponent for a robot that neither has wheels nor goes in any direction."""
         is_base = isinstance(at.spec.robots[at.robot.name], HolonomicRobot)
         if not is_base and made_model(at.spec, at.layout, at.robot).wheels() is None:
-            raise Misfit(("kind",), "it moves robots on two wheels, and those of the model holonomic", settings.kind)
+            raise IncompatibleComponent(
+                ("kind",), "it moves robots on two wheels, and those of the model holonomic", settings.kind
+            )
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest of each coordinate (m)."""

@@ -18,7 +18,7 @@ from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.grasping import Portable, distance_from, grasp_of, portables_of
 from foosim.world.components.mounted import body_at, link_index
-from foosim.world.components.view import Misfit, Mounting, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.forms import registry
 from foosim.world.forms.forms import ENGINES, ENTITY, NO_ENTITY
 from foosim.world.forms.jobs import FAILURE, JobState
@@ -111,14 +111,15 @@ class Gripper(Actuator):
 
     @staticmethod
     def check(settings: GripperSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that is not there, an engine without grasps, a robot that it does not solve."""
+        """Raise IncompatibleComponent for a link that is not there, an engine without grasps, a robot that it does not
+        solve."""
         having = [name for name in registry.engines() if ENGINES[name].grasps]
         if not registry.find_engine(at.spec.engine).grasps:
             what = f"the engine {at.spec.engine} has no grasps: valid is {' or '.join(having)}"
-            raise Misfit(("kind",), what, settings.kind)
+            raise IncompatibleComponent(("kind",), what, settings.kind)
         if not (at.robot.is_rigid and at.robot.kind.couples):
             what = f"{at.robot.name} is no rigid body, so that no load would move it: {VALID}"
-            raise Misfit(("kind",), what, settings.kind)
+            raise IncompatibleComponent(("kind",), what, settings.kind)
         link_index(body_at(at), settings.at.link)
 
     def limits(self) -> dict[str, tuple[float, float]]:

@@ -13,7 +13,7 @@ from foosim.common.finding import Finding, Location
 from foosim.common.keyed_random import draw_key
 from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
 from foosim.world.components.base import overrides
-from foosim.world.components.view import Misfit, Mounting
+from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
@@ -243,7 +243,7 @@ def unfit_components(spec: WorldSpec) -> Iterator[Finding]:
         made: Any = form.factory
         try:
             made.check(settings, at)
-        except Misfit as error:
+        except IncompatibleComponent as error:
             place: Location = ("robots", name, section, channel, *error.path)
             yield Finding(place, error.problem, error.value, error.nearest)
 

@@ -42,7 +42,7 @@ class Component:
 
     @staticmethod
     def check(settings: Any, at: Any) -> None:
-        """Raise Misfit where the settings do not fit the robot or the world; `at` is the mounting.
+        """Raise IncompatibleComponent where the settings do not fit the robot or the world; `at` is the mounting.
 
         A modifier gets the numbers that it is on in place of a mounting (`forms.per_field.Numbers`), and raises
         BadValue.

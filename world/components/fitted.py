@@ -291,7 +291,7 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[BoundA
 
 
 def _joints(component: Component, settings: ActuatorSettings, mounting: Mounting) -> tuple[int, ...] | None:
-    """Return the joints that the settings of an actuator name; None where they name none. Raises Misfit."""
+    """Return the joints that an actuator's settings name; None where they name none. Raises IncompatibleComponent."""
     named = component.joints_named(settings)
     return None if named is None else joint_indices(mounting, named, component.joints)
 

@@ -38,7 +38,7 @@ class ComponentError(Failed):
         self.component, self.entity, self.tick, self.cause = component, entity, tick, cause
 
 
-class Misfit(BadValue):
+class IncompatibleComponent(BadValue):
     """A setting of a component that its robot or its world does not fit; `path` leads to it from the component's."""
 
     def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:

@@ -54,7 +54,7 @@ class Battery(EntityRule):
 
     @staticmethod
     def check(settings: BatteryRuleSettings, at: Mounting) -> None:
-        """Raise Misfit for a battery that the robot cannot have."""
+        """Raise IncompatibleComponent for a battery that the robot cannot have."""
         check_battery(settings, at)
 
     def place(self, view: WritableView) -> None:

@@ -53,7 +53,7 @@ class Burns(EntityRule):
 
     @staticmethod
     def check(settings: BurnsSettings, at: Mounting) -> None:
-        """Raise Misfit for a robot without a body, and for a link that it does not have."""
+        """Raise IncompatibleComponent for a robot without a body, and for a link that it does not have."""
         Mounted(at, settings.at)
 
     def has_power(self, view: View) -> bool:

@@ -63,7 +63,8 @@ class Imu(Sensor):
 
     @staticmethod
     def check(settings: ImuSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that the robot does not have, or a robot whose places move nobody knows how."""
+        """Raise IncompatibleComponent for a link that the robot does not have, or a robot whose places move nobody
+        knows how."""
         Mounted(at, settings.at).check_twist()
 
     def sample(self, view: WritableView) -> Inertial:

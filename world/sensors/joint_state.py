@@ -56,7 +56,7 @@ class JointStates(Sensor):
 
     @staticmethod
     def check(settings: JointStateSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have, or that is named twice."""
+        """Raise IncompatibleComponent for a joint that the robot does not have, or that is named twice."""
         if settings.joints:
             joint_indices(at, settings.joints)
 

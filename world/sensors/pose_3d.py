@@ -44,7 +44,7 @@ class PoseTracker3d(Sensor):
 
     @staticmethod
     def check(settings: Pose3dSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that the robot does not have."""
+        """Raise IncompatibleComponent for a link that the robot does not have."""
         Mounted(at, settings.at)
 
     def sample(self, view: View) -> Pose3d:

@@ -55,7 +55,7 @@ class Thermometer(Sensor):
 
     @staticmethod
     def check(settings: ThermometerSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that the robot does not have."""
+        """Raise IncompatibleComponent for a link that the robot does not have."""
         Mounted(at, settings.at)
 
     def sample(self, view: View) -> Temperature:

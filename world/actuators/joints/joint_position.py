@@ -41,7 +41,7 @@ class JointPositionActuator(Actuator):
 
     @staticmethod
     def check(settings: JointPositionSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:

@@ -32,7 +32,7 @@ class JointTorqueActuator(Actuator):
 
     @staticmethod
     def check(settings: JointTorqueSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:

@@ -108,7 +108,7 @@ class JointTrajectory(Actuator):
 
     @staticmethod
     def check(settings: JointTrajectorySettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:

@@ -37,7 +37,7 @@ class JointVelocityActuator(Actuator):
 
     @staticmethod
     def check(settings: JointVelocitySettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:

@@ -12,7 +12,7 @@ from foosim.common.exact_math import atan2
 from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, link_index
-from foosim.world.components.view import Misfit, Mounting, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.forms.forms import Carrier
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.quantities import JobNumber, Metres
@@ -69,10 +69,10 @@ class LookAt(Actuator):
 
     @staticmethod
     def check(settings: LookAtSettings, at: Mounting) -> None:
-        """Raise Misfit for joints that are no pan and tilt, and a link that these do not turn."""
+        """Raise IncompatibleComponent for joints that are no pan and tilt, and a link that these do not turn."""
         its = LookAt(settings, at)
         if not hangs_on(its._body, its._eye, its._tilt):
-            raise Misfit(("at", "link"), "its joints do not turn this link", settings.at.link)
+            raise IncompatibleComponent(("at", "link"), "its joints do not turn this link", settings.at.link)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest of each coordinate (m)."""

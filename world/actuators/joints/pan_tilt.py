@@ -40,7 +40,7 @@ class PanTilt(Actuator):
 
     @staticmethod
     def check(settings: PanTiltSettings, at: Mounting) -> None:
-        """Raise Misfit for joints that are not two, do not turn, or do not hang on each other."""
+        """Raise IncompatibleComponent for joints that are not two, do not turn, or do not hang on each other."""
         pan_tilt_of(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
