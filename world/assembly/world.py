@@ -258,7 +258,7 @@ class World:
         """Which of them is that of a robot, by the entity's index."""
         self._asking: dict[_Alike, Any] = {}
         """What all of them are together, where some were asked."""
-        for index, one in self._only.items():
+        for index, one in () if is_watched else self._only.items():
             motion = layout.entities[index].kind.motion
             if motion is None or not motion.takes_arrays:
                 continue

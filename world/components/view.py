@@ -71,7 +71,7 @@ def called(component: str, entity: str, tick: int, call: Callable[..., Result], 
 
 def has_together(kind: type[Any], alone: str) -> bool:
     """Whether a class has `together`, and not only one that it inherits beside another method `alone` of its own."""
-    own = next(one for one in kind.__mro__ if "together" in vars(one) or alone in vars(one))
+    own: type[Any] = next((one for one in kind.__mro__ if "together" in vars(one) or alone in vars(one)), object)
     return vars(own).get("together") is not None
 
 
