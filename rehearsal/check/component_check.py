@@ -58,9 +58,9 @@ def used_form(text: str, name: str, wanted: str) -> ComponentType:
         return found[0]
     if found:
         which = " or ".join(f"{form.type_name} {form.name}" for form in found)
-        raise BadValue(f"several forms of {name} are called this: {which}", wanted)
+        raise BadValue(f"several components of {name} are called this: {which}", wanted)
     choices = [*labels] if " " in wanted or ":" in wanted else [form.name for form in forms]
-    raise UnknownName(f"{name} uses no form called this", wanted, choices)
+    raise UnknownName(f"{name} uses no component called this", wanted, choices)
 
 
 @dataclass

@@ -158,7 +158,7 @@ def test_what_modules_print_is_not_in_the_schema(told: Telling) -> None:
 
 
 def test_a_name_in_place_of_a_form_is_told_its_form() -> None:
-    with pytest.raises(UnknownName, match=r"unknown form; is it sensor pose\? \(there are: "):
+    with pytest.raises(UnknownName, match=r"unknown component type; is it sensor pose\? \(there are: "):
         chosen("pose", None)
 
 
