@@ -41,7 +41,9 @@ def chosen(form: str | None, name: str | None) -> list[ComponentType]:
     """Return all of the forms, or those that were asked for. Raises UnknownName."""
     if form is not None and form not in FORMS:
         named = [one for one in FORMS if registry.lookup(one, form) is not None] if ":" not in form else []
-        raise UnknownName("; ".join(["unknown component type", *(f"is it {one} {form}?" for one in named)]), form, FORMS)
+        raise UnknownName(
+            "; ".join(["unknown component type", *(f"is it {one} {form}?" for one in named)]), form, FORMS
+        )
     forms = FORMS if form is None else (form,)
     if name is None:
         return [registry.find(one, kind) for one in forms for kind in registry.names(one)]

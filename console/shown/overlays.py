@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from foosim.deployment.schema import Deployment
-from foosim.world.components.base import overrides
 from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.view import ComponentError, called
 from foosim.world.forms import registry
 from foosim.world.forms.failures import ContractError
+from foosim.world.forms.forms import overrides
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 

@@ -12,7 +12,6 @@ from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, Unknown
 from foosim.common.finding import Finding, Location
 from foosim.common.keyed_random import draw_key
 from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
-from foosim.world.components.base import overrides
 from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
@@ -24,6 +23,7 @@ from foosim.world.forms.forms import (
     Kit,
     Model,
     WorldRule,
+    overrides,
     with_article,
     word_of,
 )

@@ -7,7 +7,7 @@ run checks it. Worlds of foosim's own components are not tried: tests do that.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from foosim.world.components.fitted import BoundActuator, BoundSensor, sensors_o
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, View, WritableView, called
 from foosim.world.components.watching import ReadOnly
-from foosim.world.fixed_scenery import kits_of
+from foosim.world.fixed_scenery import scene_shapes
+from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Layout, build_layout
@@ -70,9 +71,11 @@ def _place_of(spec: WorldSpec, error: ComponentError) -> Location:
 
 def _try_tick(spec: WorldSpec, layout: Layout) -> None:
     """Make all components and call what a run calls of them in a tick, first of all what motions rest on: bodies."""
+    for name, section in sorted(spec.kits.items()):
+        called(f"kit {name}", "", 0, _ask_kit, registry.find("kit", name).factory, section, spec)
+    if spec.scene is not None:
+        called(f"scene {spec.scene.kind}", "", 0, scene_shapes, spec)
     build_scene(spec, layout)
-    for name, kit in kits_of(spec):
-        called(f"kit {name}", "", 0, lambda kit=kit: [kit.physics(), *kit.findings()])
     world = World(spec, layout, is_watched=True)
     start = initial_numbers(spec, layout, world.models, is_watched=True)
     sensors = [sensor for robot in layout.robots for sensor in sensors_of(spec, layout, robot)]
@@ -94,6 +97,13 @@ def _try_tick(spec: WorldSpec, layout: Layout) -> None:
     called("status", "", TICK, encode_json, status)
     for text in world_texts(spec, status):
         assert not text.startswith((NO_STATUS, NO_TEXT)), text
+
+
+def _ask_kit(factory: Any, section: Any, spec: WorldSpec) -> None:
+    kit = factory(section, spec)
+    kit.physics()
+    for _ in (*kit.shapes(), *kit.findings()):
+        pass
 
 
 def _sample(sensors: Sequence[BoundSensor], numbers: Sequence[float]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foosim.common.keyed_random import draw_key
 from foosim.world.assembly.event_times import events_by_tick
-from foosim.world.components.base import EntityRule, Model, Motion, Rule, overrides
+from foosim.world.components.base import EntityRule, Model, Motion, Rule
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting, mounting_of
 from foosim.world.components.fitted import BoundActuator, actuators_of
@@ -30,7 +30,7 @@ from foosim.world.edits import parked
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
 from foosim.world.forms import registry
 from foosim.world.forms.failures import ContractError, failure_of
-from foosim.world.forms.forms import NO_ENTITY
+from foosim.world.forms.forms import NO_ENTITY, overrides
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout, find_entity_rule, find_rule, world_rules
 from foosim.world.scene import Body, Scene

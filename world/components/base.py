@@ -7,7 +7,7 @@ settings and keyed draws: what it remembers is slots, and its object keeps only 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from foosim.world.forms.jobs import JobState
@@ -19,17 +19,9 @@ if TYPE_CHECKING:
     from foosim.world.frame import Frame
     from foosim.world.layout import Entity
     from foosim.world.matter.physics import Physics
-    from foosim.world.moving.upright import Upright
-    from foosim.world.moving.wheels import Wheels
     from foosim.world.scene import Body, Shape, Vector
 
     Limits = Mapping[str, tuple[float, float]]
-
-
-def overrides(kind: Callable[..., Any], hook: str) -> bool:
-    """Whether a class of components has a hook of its own, and not the empty one of its type."""
-    having = [one for one in getattr(kind, "__mro__", ()) if hook in vars(one)]
-    return bool(having) and having[0].__module__ != __name__
 
 
 class Component:
@@ -62,7 +54,7 @@ class Sensor(Component):
 
     def sample(self, view: WritableView) -> Any:
         """Return what is measured: a value of the registered reading."""
-        raise NotImplementedError
+        return None
 
     def limits(self) -> Limits:
         """Return the least and the greatest value that each field of a reading can have."""
@@ -84,7 +76,7 @@ class Actuator(Component):
 
     def accept(self, command: Any, view: WritableView) -> bool:
         """Take a command within the limits, a value of the registered type, into the slots; False: it is refused."""
-        raise NotImplementedError
+        return False
 
     def command(self, view: View) -> Motors:
         """Return (target speed, greatest force or acceleration) of each motor of the robot, in SI units.
@@ -129,7 +121,7 @@ class Actuator(Component):
 
     def progress(self, view: WritableView) -> JobState:
         """Return, after the robot was solved and while a job runs, whether it runs on, is done or has failed."""
-        raise NotImplementedError
+        return JobState.FAILED
 
 
 class Modifier(Component):
@@ -142,7 +134,7 @@ class Modifier(Component):
 
     def apply(self, values: list[float], view: WritableView) -> list[float] | None:
         """Return what becomes of the numbers of a value; None: it is dropped."""
-        raise NotImplementedError
+        return values
 
     def accept(self, values: list[float], view: WritableView) -> list[float] | None:
         """Return what becomes of the numbers of a command; None: it is dropped, or waits."""
@@ -172,7 +164,6 @@ class Model(Component):
 
     def place_at(self, view: WritableView, position: Vector, velocity: Vector = (0.0, 0.0, 0.0)) -> None:
         """Put it somewhere (m, m/s, world frame): overridden by models whose settings have no place."""
-        raise NotImplementedError
 
     def derive(self, view: WritableView) -> None:
         """Write the fields of a rigid model that follow from what the engine has computed, which is finite."""
@@ -192,12 +183,12 @@ class Model(Component):
         """Return the numbers of its slots for a new value of something settable."""
         return {field: (value,)}
 
-    def upright(self) -> Upright | None:
-        """Return the cylinder that it is to obstacles; None: the one around its body."""
+    def upright(self) -> Any:
+        """Return the cylinder that it is to obstacles (`moving.upright.Upright`); None: the one around its body."""
         return None
 
-    def wheels(self) -> Wheels | None:
-        """Return its two driven wheels, if it has such."""
+    def wheels(self) -> Any:
+        """Return its two driven wheels (`moving.wheels.Wheels`); None of what has none."""
         return None
 
 
@@ -218,7 +209,6 @@ class Motion:
         `view.numbers` are those at the start of the tick, of all entities, before commands reached them. What is
         written is read at the next tick, so that the order in which entities are moved changes nothing.
         """
-        raise NotImplementedError
 
 
 class _Marking(Component):

@@ -9,8 +9,8 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import msgspec
 
-from foosim.world.components.base import overrides
 from foosim.world.forms.failures import ContractError
+from foosim.world.forms.forms import overrides
 from foosim.world.forms.payloads import Field, PayloadCodec, field_at
 
 Bound: TypeAlias = tuple[float, float]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 from foosim.common.keyed_random import draw_key
-from foosim.world.components.base import Motion
 from foosim.world.components.view import Mounting, Slot
 from foosim.world.layout import MOTION, WORLD, Entity, Layout
 from foosim.world.spec import WorldSpec
@@ -44,7 +43,7 @@ class MotionMounting:
 
     spec: WorldSpec
     layout: Layout
-    motion: type[Motion]
+    motion: type[Any]
     entities: tuple[Entity, ...]
 
     def settings(self, kind: type[S]) -> dict[int, S]:

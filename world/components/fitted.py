@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
-from foosim.world.components.base import Actuator, Modifier, Sensor, overrides
+from foosim.world.components.base import Actuator, Modifier, Sensor
 from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
 from foosim.world.components.job_book import JobBook
 from foosim.world.components.mounted import joint_indices
@@ -23,7 +23,7 @@ from foosim.world.components.view import (
 )
 from foosim.world.forms import registry
 from foosim.world.forms.failures import ContractError
-from foosim.world.forms.forms import SAMPLES, Component
+from foosim.world.forms.forms import SAMPLES, Component, overrides
 from foosim.world.forms.payloads import FLOAT, PayloadCodec, as_floats
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings

@@ -31,6 +31,8 @@ NO_ENTITY: Final = -1.0
 
 SAMPLES: Final = "samples"
 """The slot of each sensor that counts what it has sampled; no component declares one of this name."""
+BASE_CLASSES: Final = "foosim.world.components.base"
+"""The module of the base classes of components."""
 ROBOTS: Final = "*"
 SLOTS_MAX: Final = 65_536
 """Numbers in all slots of one component, model, motion or rule."""
@@ -93,6 +95,12 @@ class Carrier:
     size: int
     period_ns: int
     joints: int = 0
+
+
+def overrides(kind: Callable[..., Any], hook: str) -> bool:
+    """Whether a class of components has a hook of its own, and not the empty one of its base class."""
+    having = [one for one in getattr(kind, "__mro__", ()) if hook in vars(one)]
+    return bool(having) and having[0].__module__ != BASE_CLASSES
 
 
 def word_of(form: str) -> str:

@@ -11,9 +11,16 @@ from foosim.common.errors import BadValue, Refused, show
 from foosim.common.names import NAME_RULE, is_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.components.base import Actuator, EntityRule, Kit, Model, Modifier, Rule, Sensor, overrides
 from foosim.world.forms import forms
-from foosim.world.forms.forms import OF_ROBOTS, OF_SOLVED, SET_BY_FOOSIM, slots_problem, with_article, word_of
+from foosim.world.forms.forms import (
+    OF_ROBOTS,
+    OF_SOLVED,
+    SET_BY_FOOSIM,
+    overrides,
+    slots_problem,
+    with_article,
+    word_of,
+)
 from foosim.world.forms.jobs import JOB
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.settings import BASES
@@ -21,10 +28,6 @@ from foosim.world.forms.shown import MESSAGES
 
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
 """What the values of a component are called."""
-CLASSES: Final[Mapping[str, type[Any]]] = {
-    one.type_name: one for one in (Sensor, Actuator, Modifier, Model, Rule, EntityRule, Kit)
-}
-"""The base classes of components."""
 TYPES: Final[Mapping[str, Any]] = {
     **dict.fromkeys(("kit", "joints"), str),
     **dict.fromkeys(("needs", "writes", "shared", "tags"), tuple[str, ...]),
@@ -48,9 +51,10 @@ def check_form(found: Any) -> None:
 
 def _problems(found: Any) -> Iterator[str]:
     """Yield what is wrong with a description. Each field is read only where those before it are right."""
-    wanted, base, settings = CLASSES.get(found.type_name), BASES.get(found.type_name, SpecBase), found.settings
-    if wanted is not None and isinstance(found.factory, type) and not issubclass(found.factory, wanted):
-        yield f"the class {found.factory.__name__} is not derived from {wanted.__name__} of foosim.components"
+    base, settings, bases = BASES.get(found.type_name, SpecBase), found.settings, getattr(found.factory, "__mro__", ())
+    if bases and not any(vars(one).get("type_name") == found.type_name for one in bases):
+        wanted = found.type_name.title().replace("_", "")
+        yield f"the class {found.factory.__name__} is not derived from {wanted} of foosim.components"
     if not (isinstance(settings, type) and issubclass(settings, base)):
         yield f"its settings are a class derived from {base.__name__}, not {_shown(settings)}"
     for key, kind in TYPES.items():

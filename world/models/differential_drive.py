@@ -8,7 +8,6 @@ from typing import ClassVar, Final
 import numpy as np
 
 from foosim.common.exact_math import atan2
-from foosim.world.clearance.free_way import FreeWay
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, Slot, WritableView
@@ -18,6 +17,7 @@ from foosim.world.layout import Entity
 from foosim.world.moving.arcs import Arcs, Floats, along_arcs, approached
 from foosim.world.moving.asked import asked_of
 from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
 from foosim.world.moving.wheels import WheelMotors, Wheels, slips_of, wheels_of
 from foosim.world.parameters.differential import DifferentialDriveRobot, rigid_body
@@ -65,7 +65,7 @@ class WheeledMotion(Motion):
 
     A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
     From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a robot goes along an
-    arc (`moving.arcs`), as far as nothing is in the way (`clearance.free_way`). It turns on the spot where all is
+    arc (`moving.arcs`), as far as nothing is in the way (`moving.free_way`). It turns on the spot where all is
     blocked, with its wheels slipping.
     """
 

@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 
 from foosim.common.spec_base import default
-from foosim.world.clearance.free_way import FreeWay
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, WritableView
@@ -18,6 +17,7 @@ from foosim.world.layout import Entity
 from foosim.world.moving.arcs import along_arcs, approached, approached_together
 from foosim.world.moving.asked import asked_of
 from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
 from foosim.world.parameters.vehicles import (
     Acceleration,
@@ -74,7 +74,7 @@ class HolonomicMotion(Motion):
 
     The velocity in the base's own frame approaches what is asked of it: the vector in the plane with at most one
     acceleration, the turning with another. With it the base goes along an arc (`moving.arcs`), as far as nothing is in
-    the way (`clearance.free_way`); it turns where it is blocked.
+    the way (`moving.free_way`); it turns where it is blocked.
     """
 
     def __init__(self, at: MotionMounting) -> None:

@@ -14,7 +14,6 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.clearance.free_way import FreeWay
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, WritableView
@@ -25,6 +24,7 @@ from foosim.world.layout import Entity
 from foosim.world.matter.materials import UNKNOWN, Radio
 from foosim.world.moving.arcs import Floats, shorter, upright_turn
 from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.path import Path, Point, path_at_speed, path_of
 from foosim.world.moving.upright import Upright
 from foosim.world.parameters.vehicles import HULL, Height, Radius, Speed, is_in_reach
@@ -154,7 +154,7 @@ class _Batch:
 class Track(Motion):
     """Along a path in time, and waiting while something is in the way; `clock` is the time on the path (s).
 
-    The clock of a path is a slot. Where an obstacle is in the way (`clearance.free_way`) it runs less, by halves, and
+    The clock of a path is a slot. Where an obstacle is in the way (`moving.free_way`) it runs less, by halves, and
     so the thing waits on its path.
     """
 

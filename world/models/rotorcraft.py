@@ -11,7 +11,6 @@ import numpy as np
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
-from foosim.world.clearance.free_way import FreeWay
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, WritableView
@@ -21,6 +20,7 @@ from foosim.world.layout import Entity
 from foosim.world.moving.arcs import Floats, approached, approached_together, shorter, upright_turn, wrapped
 from foosim.world.moving.asked import asked_of
 from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
 from foosim.world.parameters.vehicles import (
     Acceleration,
@@ -91,7 +91,7 @@ class RotorcraftMotion(Motion):
 
     The velocity over the ground and that in height approach what is wanted by at most a dt each, where a is the
     acceleration over the square root of 2: one is never kept from braking by the other. The heading turns the shorter
-    way, at most so fast. A rotorcraft that is stopped by an obstacle (`clearance.free_way`) has the velocity of the way
+    way, at most so fast. A rotorcraft that is stopped by an obstacle (`moving.free_way`) has the velocity of the way
     that was left to it.
     """
 

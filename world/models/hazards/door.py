@@ -12,7 +12,6 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.clearance.leaf import InTheWay, Leaf
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, Slot, WritableView
@@ -21,6 +20,7 @@ from foosim.world.forms.registry import model
 from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity
 from foosim.world.matter.materials import WOOD, Radio
+from foosim.world.moving.leaf import InTheWay, Leaf
 from foosim.world.parameters.vehicles import HULL, Height, Speed, UprightAt, is_in_reach
 from foosim.world.placing import ORIGIN_OF_WORLD
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Link, Shape, Vector, turn

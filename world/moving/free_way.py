@@ -18,7 +18,11 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.clearance.solids import (
+from foosim.world.components.entities import MotionMounting
+from foosim.world.components.view import Slot, WritableView
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import WORLD, Entity
+from foosim.world.moving.solids import (
     Floats,
     Places,
     Solids,
@@ -30,10 +34,6 @@ from foosim.world.clearance.solids import (
     solid,
     solids,
 )
-from foosim.world.components.entities import MotionMounting
-from foosim.world.components.view import Slot, WritableView
-from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import WORLD, Entity
 from foosim.world.moving.upright import is_upright, made_model, upright_of
 from foosim.world.scene import Body, Shape, place, swept_box
 
