@@ -71,10 +71,10 @@ def _place_of(spec: WorldSpec, error: ComponentError) -> Location:
 
 def _try_tick(spec: WorldSpec, layout: Layout) -> None:
     """Make all components and call what a run calls of them in a tick, first of all what motions rest on: bodies."""
-    for name, section in sorted(spec.kits.items()):
-        called(f"kit {name}", "", 0, _ask_kit, registry.find("kit", name).factory, section, spec)
     if spec.scene is not None:
         called(f"scene {spec.scene.kind}", "", 0, scene_shapes, spec)
+    for name, section in sorted(spec.kits.items()):
+        called(f"kit {name}", "", 0, _ask_kit, registry.find("kit", name).factory, section, spec)
     build_scene(spec, layout)
     world = World(spec, layout, is_watched=True)
     start = initial_numbers(spec, layout, world.models, is_watched=True)
