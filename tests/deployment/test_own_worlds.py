@@ -42,7 +42,8 @@ SENSOR: Final = "robots.red.goal.sensors.own={kind: 'own_form:OwnSensor', rate: 
 RULE: Final = "robots.red.goal.rules={own: {kind: 'own_form:OwnRule'}}"
 WORLD: Final = "rules={own: {kind: 'own_form:World'}}"
 TWO: Final = (
-    "class OwnSensor(Sensor): pass",
+    "class OwnSensor(Sensor):",
+    "    def sample(self, view): return Number(0.0)",
     "class OwnRule(EntityRule): pass",
     "class World(Own): pass",
     "sensor('own-sensor', Settings, Number, slots={SENSOR})(OwnSensor)",

@@ -223,7 +223,7 @@ def test_a_form_is_named_as_deployments_do() -> None:
 
 WRONG: Final = {
     "encodr": "table.yaml uses no component called this (there are: ball, camera, delay, encoder, football, "
-    "gaussian_noise, pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
+    "gaussian_noise, rod, rod_position, table), 'encodr', nearest is 'encoder'",
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
     "foosim.world.models.rod:Rot": "nearest is 'foosim.world.models.rod:Rod'",
@@ -318,9 +318,7 @@ HEARD: Final = {
 @pytest.mark.parametrize("trigger", HEARD)
 def test_the_trigger_of_a_sensor_is_a_slot_of_its_own_or_of_a_rule(planted: Path, trigger: str) -> None:
     """Its own slot is set for the tick after the one at which it measures, a rule's for the tick after it applied."""
-    head = HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
-        "import RuleSettings", "import EntityRuleSettings, RuleSettings"
-    )
+    head = HEAD.replace("import RuleSettings", "import EntityRuleSettings, RuleSettings")
     (planted / "own_form.py").write_text(head + ALARMS.replace("TRIGGER", trigger))
     rules = "robots.red.goal.rules={beeps: {kind: 'own_form:Alarms'}}"
     frames = Frames()
@@ -333,9 +331,7 @@ def test_the_trigger_of_a_sensor_is_a_slot_of_its_own_or_of_a_rule(planted: Path
 
 def test_a_slot_that_nobody_has_is_refused_with_what_may_be_named(planted: Path) -> None:
     (planted / "own_form.py").write_text(
-        HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
-            "import RuleSettings", "import EntityRuleSettings, RuleSettings"
-        )
+        HEAD.replace("import RuleSettings", "import EntityRuleSettings, RuleSettings")
         + ALARMS.replace("TRIGGER", "beeps.alarm")
     )
     with pytest.raises(

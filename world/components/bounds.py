@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import msgspec
 
+from foosim.world.components.base import Actuator
 from foosim.world.forms.failures import ContractError
 from foosim.world.forms.forms import overrides
 from foosim.world.forms.payloads import Field, PayloadCodec, field_at
@@ -46,7 +47,7 @@ def _is_bound(value: object) -> bool:
 
 def bounds_of(made: Any, fields: Sequence[Field], size: int) -> list[Bound]:
     """Return the least and the greatest of each of `size` numbers: `bounds()` of a component, else its `limits()`."""
-    bounds = made.bounds()
+    bounds = made.bounds() if isinstance(made, Actuator) else None
     if bounds is not None:
         return list(bounds)
     limits = limits_of(made, fields)
