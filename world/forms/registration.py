@@ -109,6 +109,8 @@ def _values(found: Any) -> Iterator[str]:
             codec.encode_checked(codec.nothing())
         except BadValue:
             yield f"its command {value} may be a job: its fields must be numbers, or tuples which may be empty"
+        if not overrides(found.factory, "progress"):
+            yield f"its commands may be jobs, and {found.factory.__name__} has no method progress"
     if found.shown_as:
         yield from _shown_as(found, codec)
 
