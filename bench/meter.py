@@ -11,7 +11,7 @@ from typing import Final, ParamSpec, TypeVar
 
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Engine, IslandEngine
-from foosim.node.physics.making import kind_of
+from foosim.node.physics.making import engine_of
 from foosim.world.layout import Entity, Layout
 
 ENGINE_PARTS: Final = ("load", "command", "step", "read")
@@ -107,7 +107,7 @@ def metered_engine(meter: Meter) -> Callable[[Deployment, Layout], Engine]:
     """Return a factory of the deployment's engine, metered."""
 
     def make(deployment: Deployment, layout: Layout) -> Engine:
-        made = kind_of(deployment).make(deployment, layout)
+        made = engine_of(deployment, layout)
         assert not isinstance(made, IslandEngine), "the table's bodies share a solve"
         return MeteredEngine(made, meter)
 

@@ -61,13 +61,13 @@ def check(
 
 @app.command("components check")
 def check_component(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A name, 'FORM NAME', or module:Class.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A name, 'TYPE NAME', or module:Class.")],
     file: Annotated[Path, typer.Option("--in", help="A deployment that uses it.")],
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the deployment; may be repeated.")] = None,
     ticks: Annotated[int, typer.Option(min=20, help="How many ticks each rehearsal has.")] = 500,
     seed: Annotated[int, typer.Option(min=0, help="Draws which robots move when.")] = 1,
 ) -> None:
-    """Check that a form obeys the laws, in a deployment that uses it.
+    """Check that a component obeys the laws, in a deployment that uses it.
 
     Rehearses on one, two and three nodes with moved robots and objects made anew, with everything leaving and coming
     back, in another process, with all named in another order, beside a robot that does nothing and beside a second one
@@ -87,12 +87,12 @@ def check_component(
 @app.command()
 def components(
     form: Annotated[
-        str | None, typer.Argument(metavar="FORM", help="model, sensor, rule, kit or another form.")
+        str | None, typer.Argument(metavar="TYPE", help="model, sensor, rule, kit or another type.")
     ] = None,
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="One of them, or module:Class.")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Show the models, sensors, rules and other forms that a deployment can name on this machine.
+    """Show the models, sensors, rules and other components that a deployment can name on this machine.
 
     They are foosim's own and those of installed packages (entry points of the group `foosim.world`). With a name:
     settings with their units, limits and defaults, the fields of its readings or commands, what it remembers and

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from foosim.common.errors import UnknownName
 from foosim.world.forms import registry
-from foosim.world.forms.forms import ROBOTS, Component, Form, Model, References
+from foosim.world.forms.forms import ROBOTS, Component, ComponentType, Model, References
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.registration import VALUES
 from foosim.world.forms.registry import FORMS
@@ -16,8 +16,7 @@ from foosim.world.placing import is_placed
 from foosim.world.setting.settable import valid
 
 OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
-    "model": ("is_robot", "is_rigid", "motion", "actuators", "rules", "tags"),
-    "motion": ("writes",),
+    "model": ("is_robot", "mover", "actuators", "rules", "tags"),
     "rule": ("each", "writes"),
     "entity_rule": ("writes", "shared"),
     "kit": ("entities", "rules", "presets"),
@@ -38,47 +37,48 @@ BOUNDS: Final[Mapping[str, str]] = {
 }
 
 
-def chosen(form: str | None, name: str | None) -> list[Form]:
+def chosen(form: str | None, name: str | None) -> list[ComponentType]:
     """Return all of the forms, or those that were asked for. Raises UnknownName."""
     if form is not None and form not in FORMS:
         named = [one for one in FORMS if registry.lookup(one, form) is not None] if ":" not in form else []
-        raise UnknownName("; ".join(["unknown form", *(f"is it {one} {form}?" for one in named)]), form, FORMS)
+        raise UnknownName(
+            "; ".join(["unknown component type", *(f"is it {one} {form}?" for one in named)]), form, FORMS
+        )
     forms = FORMS if form is None else (form,)
     if name is None:
         return [registry.find(one, kind) for one in forms for kind in registry.names(one)]
     return [registry.find(one, name) for one in forms]
 
 
-def as_json(component: Form) -> dict[str, Any]:
+def as_json(component: ComponentType) -> dict[str, Any]:
     """Return all that there is to know of one."""
     slots = getattr(component, "slots", {})
     about: dict[str, Any] = {
-        "form": component.form,
+        "type": component.type_name,
         "name": component.name,
         "summary": component.summary,
-        "class": f"{component.module}:{component.made.__qualname__}",
+        "class": f"{component.module}:{component.factory.__qualname__}",
         "settings": [{"key": key, "value": value, "default": default} for key, value, default in _settings(component)],
         "slots": None if callable(slots) else {field: int(size) for field, size in slots.items()},
         "needs": list(getattr(component, "needs", ())),
         "kit": component.kit,
-        "meshes": getattr(component, "meshes", False),
-        **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.form, ())},
+        **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.type_name, ())},
         "settable": _settable(component),
     }
     if isinstance(component, Model) and component.variants:
         about["variants"] = {
-            dynamics: {"class": f"{one.module}:{one.made.__qualname__}", **_moved(one)}
+            dynamics: {"class": f"{one.module}:{one.factory.__qualname__}", **_moved(one)}
             for dynamics, one in component.variants.items()
         }
     if isinstance(component, Component) and component.value is not None:
         fields = PayloadCodec(component.value, component.name).fields
-        about[VALUES[component.form]] = [
+        about[VALUES[component.type_name]] = [
             {"field": field.name, "unit": field.unit, "several": field.is_several} for field in fields
         ]
     return about
 
 
-def _settable(component: Form) -> dict[str, str]:
+def _settable(component: ComponentType) -> dict[str, str]:
     """Return what can be set of one while a run goes on, and what is valid."""
     if isinstance(component, Model):
         placed = {"at": "a pose"} if is_placed(component.settings) else {}
@@ -91,28 +91,28 @@ def _settable(component: Form) -> dict[str, str]:
 def _moved(model: Model) -> dict[str, Any]:
     """Return what moves the entities of a model, and the slots of their state."""
     slots = None if callable(model.slots) else {field: int(size) for field, size in model.slots.items()}
-    return {"is_rigid": model.is_rigid, "motion": model.motion, "slots": slots}
+    return {"mover": model.mover, "slots": slots}
 
 
-def line(component: Form) -> str:
+def line(component: ComponentType) -> str:
     """Return one in one line."""
-    return f"{component.form:11} {component.name:16} {component.summary}"
+    return f"{component.type_name:11} {component.name:16} {component.summary}"
 
 
-def lines(component: Form) -> Iterator[str]:
+def lines(component: ComponentType) -> Iterator[str]:
     """Yield one in full."""
     about = as_json(component)
-    yield f"{component.form} {component.name}, of {about['class']}"
+    yield f"{component.type_name} {component.name}, of {about['class']}"
     yield f"  {component.summary}"
     if about["settings"]:
         yield "  settings"
     for setting in about["settings"]:
         default = "required" if setting["default"] is None else f"default {setting['default']}"
         yield f"    {setting['key']}: {setting['value']} ({default})"
-    if component.form in VALUES:
-        fields = about[VALUES[component.form]]
+    if component.type_name in VALUES:
+        fields = about[VALUES[component.type_name]]
         units = [f"{field['field']}{'[]' if field['several'] else ''} {field['unit']}".rstrip() for field in fields]
-        yield f"  {VALUES[component.form]}: {', '.join(units)}"
+        yield f"  {VALUES[component.type_name]}: {', '.join(units)}"
     if about["slots"]:
         yield f"  slots: {_counted(about['slots'])}"
     elif about["slots"] is None:
@@ -122,8 +122,6 @@ def lines(component: Form) -> Iterator[str]:
     yield from _lines_of_form(about)
     if about["settable"]:
         yield f"  can be set: {', '.join(f'{name} ({valid})' for name, valid in about['settable'].items())}"
-    if about["meshes"]:
-        yield "  has scenery of triangles (shape: mesh)"
     if component.kit:
         yield f"  needs a deployment with: {component.kit}"
 
@@ -136,13 +134,13 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  writes: {', '.join(about['writes'])}"
     if about.get("shared"):
         yield f"  slots that are the model's where it has them: {', '.join(about['shared'])}"
-    if about["form"] == "model":
+    if about["type"] == "model":
         yield "  a robot" if about["is_robot"] else "  no robot: nobody owns it"
-        yield f"  moved by: {_mover_of(about)}"
+        yield f"  moved by: {about['mover']}"
         for dynamics, its in about.get("variants", {}).items():
             slots = "by its settings" if its["slots"] is None else _counted(its["slots"])
-            yield f"  with dynamics: {dynamics}, moved by: {_mover_of(its)}; slots: {slots}"
-    usual = "usual " if about["form"] == "model" else ""
+            yield f"  with dynamics: {dynamics}, moved by: {its['mover']}; slots: {slots}"
+    usual = "usual " if about["type"] == "model" else ""
     for key in ("actuators", "rules"):
         if about.get(key):
             kinds = {name: settings["kind"] for name, settings in about[key].items()}
@@ -153,10 +151,6 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
         yield f"  beside the robots: {_paired(about['entities'])}"
     if about.get("presets"):
         yield f"  presets: {', '.join(about['presets'])}"
-
-
-def _mover_of(about: Mapping[str, Any]) -> str:
-    return "an engine" if about["is_rigid"] else about["motion"] or "nothing"
 
 
 def _paired(kinds: Mapping[str, str]) -> str:
@@ -176,7 +170,7 @@ def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def _settings(component: Form) -> Iterator[tuple[str, str, str | None]]:
+def _settings(component: ComponentType) -> Iterator[tuple[str, str, str | None]]:
     """Yield key, what is valid, and the default of each setting; None where it is required."""
     schema = component.settings.model_json_schema(by_alias=True)
     yield from _properties(schema, schema.get("$defs", {}), "")

@@ -150,7 +150,7 @@ LAST_LINES: Final = 10
 def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> int:
     """Check a form in a deployment that uses it, and print what was found; return the exit code."""
     form = used_form(text, str(file), name)
-    label, folder = f"{form.form} {form.name}", file.parent
+    label, folder = f"{form.type_name} {form.name}", file.parent
     text, files = pin_assets(text, str(file), folder)
     check = ComponentCheck(text, str(file), ticks, seed, files, partial(rehearse, folder=folder))
     shows, is_broken = sys.stderr.isatty(), False

@@ -88,7 +88,7 @@ class Jobs:
         its = deployment.robots[robot]
         self.what: Final = f"{robot}/{actuator}"
         kind = its.actuators[actuator].component_type
-        self._failures: Mapping[float, str] = getattr(kind.made, "FAILURES", {})
+        self._failures: Mapping[float, str] = getattr(kind.factory, "FAILURES", {})
         if not kind.jobs:
             raise BadValue(f"{self.what} does no jobs", its.actuators[actuator].kind)
         self.senders: Final = deployment.senders_to(robot)

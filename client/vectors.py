@@ -21,7 +21,7 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received
 from foosim.world.components.bounds import bounds_of
-from foosim.world.components.fitted import FittedActuator, FittedSensor, actuators_of, sensors_of
+from foosim.world.components.fitted import BoundActuator, BoundSensor, actuators_of, sensors_of
 from foosim.world.forms.payloads import field_at
 from foosim.world.layout import build_layout
 
@@ -55,26 +55,24 @@ class _Part(NamedTuple):
     stop: int
 
 
-def numbers_in(one: FittedSensor | FittedActuator) -> int:
+def numbers_in(one: BoundSensor | BoundActuator) -> int:
     """Return how many numbers a reading or plain command has; 0 of one that is not numbers, or not always as many."""
-    made: Any = one.sensor if isinstance(one, FittedSensor) else one.actuator
-    size = len(made.bounds()) if not one.size and hasattr(made, "bounds") else one.size
+    made: Any = one.sensor if isinstance(one, BoundSensor) else one.actuator
+    size = one.size or len(getattr(made, "bounds", tuple)() or ())
     return size - one.codec.has_job if size else 0
 
 
 class _Table:
     """The columns of some channels, and where each channel's are."""
 
-    def __init__(
-        self, fitted: Sequence[FittedSensor | FittedActuator], bounds: Mapping[str, Bounds] = NO_BOUNDS
-    ) -> None:
+    def __init__(self, fitted: Sequence[BoundSensor | BoundActuator], bounds: Mapping[str, Bounds] = NO_BOUNDS) -> None:
         for glob, (least, most) in bounds.items():
             if not least < most:
                 raise BadValue(f"bounds of {glob}: the first is below the second", str((least, most)))
         columns: list[Column] = []
         self.parts: list[_Part] = []
         for one in fitted:
-            made: Any = one.sensor if isinstance(one, FittedSensor) else one.actuator
+            made: Any = one.sensor if isinstance(one, BoundSensor) else one.actuator
             start, size = len(columns), numbers_in(one)
             for place, bound in enumerate(bounds_of(made, one.codec.fields, size)):
                 (low, high), field = bound, field_at(one.codec.fields, size, place)

@@ -34,8 +34,12 @@ def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Findin
         return data, []
     reader = _Reader()
     read = {key: value for key, value in data.items() if key != KITS}
-    if isinstance(data.get("engine"), str) and reader.find("engine", data["engine"], ("engine",)) is None:
-        del read["engine"]
+    if isinstance(engine := data.get("engine"), str):
+        try:
+            registry.find_engine(engine)
+        except BadValue as error:
+            reader.findings.append(Finding(("engine",), error.problem, engine, error.nearest))
+            del read["engine"]
     kits = {key: read.pop(key) for key in data if key not in known and reader.is_kit(key)}
     if KITS in data:
         reader.findings.append(Finding((KITS,), "unknown key", KITS, at="key"))

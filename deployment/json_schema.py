@@ -7,7 +7,7 @@ from foosim.common.names import CLASS_PATTERN
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.file_schema import file_schema
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Form, Kit, Model, with_article, word_of
+from foosim.world.forms.forms import ENGINES, ComponentType, Kit, Model, with_article, word_of
 from foosim.world.forms.settings import BASES, EntitySettings, RobotSettings
 from foosim.world.spec import KITS
 
@@ -58,9 +58,8 @@ def _kit(name: str) -> Kit:
 
 def _any_engine(*, installed: bool) -> dict[str, Any]:
     """Return the schema of an engine's name."""
-    found = [registry.find("engine", name) for name in registry.names("engine")]
-    known = [engine.name for engine in found if installed or engine.module.startswith(OWN)]
-    return {"anyOf": [{"enum": known, "type": "string"}, _class()], "title": "Engine"}
+    known = [name for name in registry.engines() if installed or ENGINES[name].path.startswith(OWN)]
+    return {"enum": known, "title": "Engine", "type": "string"}
 
 
 def _class() -> dict[str, Any]:
@@ -100,7 +99,7 @@ def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_
     }
 
 
-def _add(form: Form, definitions: dict[str, Any]) -> str:
+def _add(form: ComponentType, definitions: dict[str, Any]) -> str:
     """Add the schema of a form's settings to the definitions, and what it refers to; return its name there.
 
     Classes of other packages may be called as foosim's, or each other's, are: their names have form and kind in front.
@@ -109,7 +108,7 @@ def _add(form: Form, definitions: dict[str, Any]) -> str:
     inner = schema.pop("$defs", {})
     schema = inner.pop(schema["$ref"].removeprefix(REF)) if "$ref" in schema else schema
     is_own = form.module.startswith(OWN)
-    name = form.settings.__name__ if is_own else f"{form.form}.{form.name}"
+    name = form.settings.__name__ if is_own else f"{form.type_name}.{form.name}"
     if not is_own:
         renamed = {REF + other: f"{REF}{name}.{other}" for other in inner if other not in OPEN}
         renamed[REF + form.settings.__name__] = REF + name  # where it refers to itself

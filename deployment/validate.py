@@ -28,7 +28,7 @@ from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.validate_network import Names, check_network, place_findings, rule_findings
 from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.used_forms import foreign_versions
-from foosim.world.components.view import Misfit, Mounting
+from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
 from foosim.world.forms.forms import (
@@ -37,12 +37,12 @@ from foosim.world.forms.forms import (
     ROBOTS,
     Carrier,
     Component,
+    ComponentType,
     EntityRule,
-    Form,
     Kit,
     Model,
-    Motion,
     WorldRule,
+    overrides,
     with_article,
     word_of,
 )
@@ -63,8 +63,8 @@ from foosim.world.layout import (
     declaring,
     least_period_ns,
     of_motion,
-    slot_that_speaks,
     spares_of,
+    trigger_slot,
 )
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.moving.upright import stands_upright
@@ -404,11 +404,11 @@ def _kits(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 def _checked(kit: Kit, deployment: Deployment) -> list[Finding]:
     """Return what a kit itself finds wrong with its section."""
-    check = getattr(kit.made, "check", None)
-    return [] if check is None else [*check(deployment.kits[kit.name], deployment)]
+    made: Any = kit.factory
+    return [*made.check(deployment.kits[kit.name], deployment)]
 
 
-def _called(found: Form, what: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def _called(found: ComponentType, what: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """Return what a function of a component type returns. Raises BadValue, also where one of other packages fails."""
     try:
         return function(*arguments)
@@ -555,10 +555,10 @@ def _components_of(entity: EntitySettings) -> Iterator[tuple[str, str, Component
         yield from ((section, name, settings) for name, settings in getattr(entity, section).items())
 
 
-def _needs_kit(form: Form, kits: Collection[str], noun: str = "") -> Iterator[str]:
+def _needs_kit(form: ComponentType, kits: Collection[str], noun: str = "") -> Iterator[str]:
     """Yield that the world is without the kit that a form is of."""
     if form.kit and form.kit not in kits:
-        yield f"{noun or word_of(form.form)} of {with_article(form.kit)} in a world without one"
+        yield f"{noun or word_of(form.type_name)} of {with_article(form.kit)} in a world without one"
 
 
 def _model_problems(model: Model, kits: Collection[str], has: Mapping[str, int] | None) -> Iterator[str]:
@@ -568,27 +568,13 @@ def _model_problems(model: Model, kits: Collection[str], has: Mapping[str, int] 
     """
     if model.is_rigid and not model.couples and model.name not in REACHED:
         yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
-    if not model.motion:
-        return
-    try:
-        motion = registry.find("motion", model.motion)
-    except BadValue as error:
-        yield f"a model without its motion: {error}"
-        return
-    assert isinstance(motion, Motion), motion
-    for verb, fields in (("needs", motion.needs), ("writes", motion.writes)):
-        missing = [] if has is None else [field for field in fields if field not in has]
-        if missing:
-            yield f"a model whose motion {motion.name} {verb} {', '.join(missing)}: {_fields_of(model, missing, has)}"
-    for problem in _needs_kit(motion, kits, motion.name):
-        yield f"a model whose motion is {problem}"
 
 
-def _component_problems(form: Form, model: Model, has: Mapping[str, int] | None) -> Iterator[str]:
+def _component_problems(form: ComponentType, model: Model, has: Mapping[str, int] | None) -> Iterator[str]:
     """Yield what a robot of a model does not have that a component or rule of it needs; `has` as above."""
-    word = word_of(form.form)
+    word = word_of(form.type_name)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
-    if isinstance(form, Component) and (field := _speaks_by_model(form)) and field not in needs:
+    if isinstance(form, Component) and (field := _trigger_of_model(form)) and field not in needs:
         needs = (*needs, field)
     missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
     if missing:
@@ -623,13 +609,13 @@ def models_of(*, robots: bool) -> list[Model]:
     return [model for model in found if model.is_robot == robots]
 
 
-def _speaks_by_model(sensor: Component) -> str:
-    """Return the field of the model by which a sensor speaks; empty of one that speaks by a slot of its own, or of a
-    rule or an actuator (`unheard`)."""
-    speaks = sensor.speaks
-    if callable(speaks) or callable(sensor.slots) or speaks in sensor.slots or "." in speaks:
+def _trigger_of_model(sensor: Component) -> str:
+    """Return the field of the model that is the trigger of a sensor; empty where that is a slot of its own, or of a
+    rule or an actuator (`_unheard`)."""
+    trigger = sensor.trigger
+    if callable(trigger) or callable(sensor.slots) or trigger in sensor.slots or "." in trigger:
         return ""
-    return speaks
+    return trigger
 
 
 def _fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None) -> str:
@@ -687,7 +673,7 @@ def _unfit_component(
     for number, modifier in enumerate(settings.modifiers):
         place: Location = (*location, "modifiers", number)
         if numbers is None:
-            what = f"a modifier of what is not numbers alone: {component.form} {component.name}"
+            what = f"a modifier of what is not numbers alone: {component.type_name} {component.name}"
             yield Finding((*place, "kind"), what, modifier.kind)
         else:
             yield from _unfit_modifier(modifier, Carrier(numbers.size, period_ns), numbers, place)
@@ -752,9 +738,8 @@ def _unfit_modifier(
     if findings:
         return
     try:
-        check = getattr(component.made, "check", None)
-        if check is not None:
-            _called(component, "its check", check, settings, numbers)
+        made: Any = component.factory
+        _called(component, "its check", made.check, settings, numbers)
         component.slots_on(settings, carrier)
     except BadValue as error:
         yield Finding(place, error.problem, _value_of(error, settings.kind), error.nearest)
@@ -788,7 +773,7 @@ def _doubled_slots(spec: Deployment, ends: Names) -> Iterator[Finding]:
     for kit in spec.kit_types.values():
         for name, model in kit.entities.items():
             kind = registry.find_model(model)
-            motion = Declaring(f"motion {kind.motion}", (kit.name,), of_motion(kind))
+            motion = Declaring("motion", (kit.name,), of_motion(kind))
             yield from _doubles([motion, *(one for its, one in of_rules if its == kind.name)], name)
 
 
@@ -819,18 +804,18 @@ def _lasting_spares(spec: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _unheard(spec: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield the sensors that speak by a slot that their robot does not have."""
+    """Yield the sensors whose trigger is a slot that their robot does not have."""
     layout: Layout | None = None
     for name, robot in spec.robots.items():
         for channel, settings in robot.sensors.items():
             sensor = settings.component_type
-            speaks = sensor.speaks_by(settings)
-            if not speaks or (callable(sensor.speaks) and hasattr(sensor.made, "check")):
+            trigger = sensor.trigger_by(settings)
+            if not trigger or (callable(sensor.trigger) and overrides(sensor.factory, "check")):
                 continue  # its own check names the setting
             layout = layout or build_layout(spec)
-            if slot_that_speaks(layout[name], channel, speaks) not in layout[name].offsets:
+            if trigger_slot(layout[name], channel, trigger) not in layout[name].offsets:
                 valid = "a slot of its own, a field of the model, or RULE.SLOT of a rule of the robot"
-                what = f"sensor that speaks by {speaks}, which {name} does not have: it is {valid}"
+                what = f"sensor whose trigger is {trigger}, which {name} does not have: it is {valid}"
                 yield Finding(("robots", name, "sensors", channel, "kind"), what, settings.kind)
 
 
@@ -865,17 +850,17 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
         (name, section, channel, settings)
         for name, robot in spec.robots.items()
         for section, channel, settings in _components_of(robot)
-        if hasattr(settings.component_type.made, "check")
+        if overrides(settings.component_type.factory, "check")
     ]
     layout = build_layout(spec) if checked else None
     for name, section, channel, settings in checked:
         assert layout is not None
         form = settings.component_type
-        key = draw_key(spec.seed, form.form, name, channel)
+        key = draw_key(spec.seed, form.type_name, name, channel)
         at = Mounting(spec, layout, layout[name], channel, key, is_owners=section == "sensors")
         try:
-            form.made.check(settings, at)
-        except Misfit as error:
+            form.factory.check(settings, at)
+        except IncompatibleComponent as error:
             place: Location = ("robots", name, section, channel, *error.path)
             yield Finding(place, error.problem, error.value, error.nearest)
 

@@ -11,10 +11,11 @@ from foosim.common.finding import Finding
 from foosim.common.keyed_random import chance_threshold
 from foosim.common.spec_base import Force, Length, Mass, Rate, SpecBase, Speed, Spin, Torque, default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Actuator, EntityRule, Kit, Model, Modifier, Motion, Rule, Sensor
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.surroundings import Surroundings
-from foosim.world.components.view import Misfit, ModifierMounting, Mounting, SolvingView, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, ModifierMounting, Mounting, View, WritableView
 from foosim.world.forms.forms import ROBOTS, Carrier
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import PerField
@@ -32,7 +33,7 @@ from foosim.world.forms.quantities import RadiansPerSecond as rad_s
 from foosim.world.forms.quantities import Share as share
 from foosim.world.forms.quantities import Volts as V
 from foosim.world.forms.quantities import Watts as W
-from foosim.world.forms.registry import actuator, entity_rule, kit, model, modifier, motion, rule, scene, sensor
+from foosim.world.forms.registry import actuator, kit, model, modifier, rule, scene, sensor
 from foosim.world.forms.settings import (
     ActuatorSettings,
     EntityRuleSettings,
@@ -62,6 +63,7 @@ __all__ = [
     "ROBOTS",
     "WOOD",
     "A",
+    "Actuator",
     "ActuatorSettings",
     "Body",
     "Box",
@@ -69,21 +71,26 @@ __all__ = [
     "Carrier",
     "Cylinder",
     "Entity",
+    "EntityRule",
     "EntityRuleSettings",
     "Finding",
     "Force",
     "Frame",
+    "IncompatibleComponent",
     "JobNumber",
     "JobState",
     "Judged",
+    "Kit",
     "Length",
     "Link",
     "MarkKind",
     "Marked",
     "Mass",
-    "Misfit",
+    "Model",
+    "Modifier",
     "ModifierMounting",
     "ModifierSettings",
+    "Motion",
     "MotionMounting",
     "Motors",
     "Mounted",
@@ -98,12 +105,13 @@ __all__ = [
     "Quantity",
     "Rate",
     "RobotSettings",
+    "Rule",
     "RuleMounting",
     "RuleSettings",
     "SceneSettings",
+    "Sensor",
     "SensorSettings",
     "Shape",
-    "SolvingView",
     "SpecBase",
     "Speed",
     "Sphere",
@@ -120,14 +128,12 @@ __all__ = [
     "cos",
     "default",
     "deg",
-    "entity_rule",
     "kit",
     "m",
     "m_s",
     "m_s2",
     "model",
     "modifier",
-    "motion",
     "rad",
     "rad_s",
     "rule",

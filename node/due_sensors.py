@@ -9,13 +9,13 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.components.fitted import FittedSensor
+from foosim.world.components.fitted import BoundSensor
 from foosim.world.forms.forms import DOWN, INACTIVE
 from foosim.world.layout import Entity
 
 TURNS_MAX: Final = 64
 """Sets of schedules whose turn is kept."""
-Sensors: TypeAlias = tuple[FittedSensor, ...]
+Sensors: TypeAlias = tuple[BoundSensor, ...]
 
 
 class Turn(NamedTuple):
@@ -57,7 +57,7 @@ class DueSensors:
     def __init__(
         self,
         robots: Sequence[Entity],
-        sensors: Mapping[str, Sequence[FittedSensor]],
+        sensors: Mapping[str, Sequence[BoundSensor]],
         switches: Mapping[str, Mapping[str, int]],
     ) -> None:
         """`sensors` and the bits of their switches are by robot."""
@@ -68,7 +68,7 @@ class DueSensors:
         self._inactive = [robot.offsets.get(INACTIVE, robot.offsets[DOWN]) for robot in robots]
         """Of one without components its `down`, which is 0 when it is looked at."""
         everyone = [one for its in self._sensors for one in its]
-        self._speaks = [one.speaks_at for one in everyone if one.speaks_at >= 0]
+        self._triggers = [one.trigger_at for one in everyone if one.trigger_at >= 0]
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
         self._due: dict[tuple[bool, ...], Turn] = {}
         """The sensors of all robots, in service or not."""
@@ -82,7 +82,7 @@ class DueSensors:
     def at(self, tick: int, numbers: Sequence[float], values: NDArray[np.float64]) -> Turn:
         """Return who measures at a tick, at whose start the numbers of the frame are these; `values` are the same."""
         value = numbers.__getitem__
-        if any(map(value, self._speaks)):
+        if any(map(value, self._triggers)):
             return self._turn(self._in_service(self._due_at(tick, numbers), numbers))
         states = values[self._states]
         out = states.tobytes()

@@ -91,7 +91,7 @@ def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     deployment: Deployment = stepper.deployment
     layout = stepper.layout
     numbers = initial_numbers(deployment, layout)
-    stepper.world.stir(numbers)
+    stepper.world.excite(numbers)
     bodies = tuple(entity for entity in layout.present(numbers) if entity.is_solved)
     for tick in range(FINGERPRINT_TICKS):
         work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})

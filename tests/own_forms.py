@@ -31,6 +31,7 @@ from foosim.world.forms.forms import ENTITY, ROBOTS
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import *
 from foosim.world.forms.settings import *
+from foosim.world.components.base import *
 
 
 class Number(Struct, frozen=True):
@@ -49,7 +50,7 @@ class Settings(SensorSettings):
     count: Annotated[int, Field(gt=0)] = 1
 
 
-class Own:
+class Own(Sensor, Actuator, Modifier, Model, Rule, Kit):
     def __init__(self, *made_with):
         pass
 
@@ -86,7 +87,7 @@ def forget_modules() -> None:
     """Modules, and deployments that name theirs, are looked for anew: another one of the same name is elsewhere now."""
     loader._kept.clear()
     for kept in (
-        *(used_forms._spec, used_forms._source, used_forms._imports, used_forms._folder, used_forms.distributions),
+        *(used_forms._spec, used_forms._source, used_forms._imports, used_forms._folder),
         *(loader._applied, registry._entry_points),
     ):
         kept.cache_clear()

@@ -72,7 +72,9 @@ class Solids:
         if body.joints:
             slots |= dict.fromkeys(JOINTS, len(body.joints))
         slots |= {**CONTACTS, **PARTNERS}
-        kind = Model(form="model", name=body.model, made=object, settings=EntitySettings, slots=slots, is_rigid=True)
+        kind = Model(
+            type_name="model", name=body.model, factory=object, settings=EntitySettings, slots=slots, is_rigid=True
+        )
         offsets, at = {}, len(self.numbers)
         for field, count in slots.items():
             offsets[field] = at

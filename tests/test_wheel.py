@@ -157,7 +157,7 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
 
 def test_the_guides_sensor_works_from_an_empty_folder(installed: Installed, tmp_path: Path) -> None:
     """With foosim as pip installs it, and a file as the guide has it."""
-    guide = (ROOT / "docs" / "how-to" / "extending.md").read_text()
+    guide = (ROOT / "docs" / "how-to" / "write_a_sensor.md").read_text()
     (source,) = re.findall(r"```python\n# powers\.py\n(.*?)```", guide, re.DOTALL)
     (setting,) = re.findall(r"--set '(.*powers:MotorPower.*)'\n", guide)
     (tmp_path / "powers.py").write_text(source)

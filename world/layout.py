@@ -30,7 +30,6 @@ from foosim.world.forms.forms import (
     Component,
     Kit,
     Model,
-    Motion,
     References,
 )
 from foosim.world.forms.jobs import job_slots
@@ -44,7 +43,9 @@ remember nothing it is not there."""
 MOTION: Final = "motion"
 """Component name of the slots in which a motion remembers."""
 
-WORLD_MODEL: Final = Model(form="model", name=WORLD, made=object, settings=RobotSettings, slots={}, is_robot=False)
+WORLD_MODEL: Final = Model(
+    type_name="model", name=WORLD, factory=object, settings=RobotSettings, slots={}, is_robot=False
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,13 +317,6 @@ def _model(kind: str) -> Model:
     return WORLD_MODEL if kind == WORLD else registry.find_model(kind)
 
 
-def find_motion(model: Model) -> Motion:
-    """Return the registered motion of a model that has one."""
-    found = registry.find("motion", model.motion)
-    assert isinstance(found, Motion), found
-    return found
-
-
 def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]:
     """Return what the rules of a world remember: of each entity, by its model; and of the world."""
     each: dict[str, dict[str, int]] = {}
@@ -337,9 +331,7 @@ def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]
 
 def of_motion(model: Model) -> dict[str, int]:
     """Return the slots in which the motion of a model remembers."""
-    if not model.motion:
-        return {}
-    return _behind(MOTION, find_motion(model).slots)
+    return {} if model.motion is None else _behind(MOTION, model.motion.slots)
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,7 +353,7 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
     model = robot.component_type
     fields = model.fields_of(robot, spec)
     joints = fields.get("joint_positions", 0)
-    yield Declaring(f"motion {model.motion}", (*place, "model"), of_motion(model))
+    yield Declaring("motion", (*place, "model"), of_motion(model))
     for label, actuator in sorted(robot.actuators.items()):
         component = actuator.component_type
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
@@ -382,11 +374,11 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
 
 
 def least_period_ns(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> int:
-    """Return the least time between two readings: a sensor that speaks may measure at each tick."""
-    return spec.tick_ns if sensor.speaks else spec.schedule(settings).least_ticks * spec.tick_ns
+    """Return the least time between two readings: a sensor with a trigger may measure at each tick."""
+    return spec.tick_ns if sensor.trigger else spec.schedule(settings).least_ticks * spec.tick_ns
 
 
-def slot_that_speaks(robot: Entity, channel: str, field: str) -> str:
+def trigger_slot(robot: Entity, channel: str, field: str) -> str:
     """Return the slot of a robot that makes a sensor of it measure: its own, else the robot's."""
     own = f"{channel}.{field}"
     return own if robot.offsets.get(own, -1) >= robot.split else field
@@ -399,7 +391,7 @@ def _demanded(robot: RobotSettings) -> dict[str, int]:
         return {}
     needs = [need for its in (*robot.actuators.values(), *robot.rules.values()) for need in its.component_type.needs]
     for its in robot.sensors.values():
-        needs += [*its.component_type.needs, its.component_type.speaks_by(its)]
+        needs += [*its.component_type.needs, its.component_type.trigger_by(its)]
     return model.demanded(needs)
 
 

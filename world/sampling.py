@@ -13,7 +13,7 @@ import numpy as np
 
 from foosim.common.names import CHANNEL_ECHO
 from foosim.world.frame import Frame
-from foosim.world.layout import slot_that_speaks
+from foosim.world.layout import trigger_slot
 from foosim.world.robot_packets import Delivered
 from foosim.world.spec import WorldSpec
 
@@ -26,13 +26,13 @@ class Sampling:
         self._schedules = tuple(sorted({spec.schedule(sensor) for sensor in sensors}))
         self._speaking = sorted(
             {
-                (name, channel, speaks)
+                (name, channel, trigger)
                 for name, robot in spec.robots.items()
                 for channel, sensor in robot.sensors.items()
-                if (speaks := sensor.component_type.speaks_by(sensor))
+                if (trigger := sensor.component_type.trigger_by(sensor))
             }
         )
-        """Robots with a sensor that speaks, its channel, and the field that makes it measure."""
+        """Robots with a sensor that has a trigger, its channel, and the trigger."""
         self._layout = b""
         self._places = np.zeros(0, np.intp)
 
@@ -57,7 +57,7 @@ class Sampling:
             self._layout = layout.digest
             self._places = np.array(
                 [
-                    layout[name].offsets[slot_that_speaks(layout[name], channel, field)]
+                    layout[name].offsets[trigger_slot(layout[name], channel, field)]
                     for name, channel, field in self._speaking
                     if name in layout
                 ],

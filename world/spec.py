@@ -131,9 +131,7 @@ class WorldSpec(SpecBase):
     @cached_property
     def engine_type(self) -> Engine:
         """The registered engine."""
-        found = registry.find("engine", self.engine)
-        assert isinstance(found, Engine), found
-        return found
+        return registry.find_engine(self.engine)
 
     @cached_property
     def kit_types(self) -> Mapping[str, Kit]:

@@ -13,7 +13,7 @@ from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
 from foosim.console.shown.scene_json import jobs_of
 from foosim.deployment.schema import Deployment
-from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.forms.jobs import JobState
 from foosim.world.layout import Layout
 
@@ -37,7 +37,7 @@ class Desk:
         encoder = CommandEncoder(deployment)
         reported = {robot: jobs_of(deployment, robot) for robot in sorted(deployment.robots)}
         self._takers = {(robot, one): encoder.actuator(robot, one) for robot, its in reported.items() for one in its}
-        self._fitted: dict[tuple[str, str], FittedActuator] = {
+        self._fitted: dict[tuple[str, str], BoundActuator] = {
             (robot, one.channel): one for robot, its in reported.items() if its
             for one in actuators_of(deployment, layout, layout[robot])
         }  # fmt: skip

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from foosim.deployment.schema import Deployment
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.view import ComponentError, called
-from foosim.world.forms.failures import WrongResult
+from foosim.world.forms.failures import ContractError
+from foosim.world.forms.forms import overrides
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 
@@ -20,13 +21,14 @@ class Overlays:
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self._layout = layout
-        self._groups: dict[tuple[Any, int], list[FittedSensor]] = {}
+        self._groups: dict[tuple[Any, int], list[BoundSensor]] = {}
         """Sensors that send rays, by their class and the length of their readings."""
         self._failures: list[str] = []
         for robot in layout.robots:
-            if any(hasattr(its.component_type.made, "rays") for its in deployment.robots[robot.name].sensors.values()):
+            sensors = deployment.robots[robot.name].sensors.values()
+            if any(overrides(its.component_type.factory, "rays") for its in sensors):
                 for fitted in self._sensors_of(deployment, layout, robot):
-                    if hasattr(fitted.sensor, "rays"):
+                    if overrides(type(fitted.sensor), "rays"):
                         self._groups.setdefault((type(fitted.sensor), fitted.size), []).append(fitted)
 
     def content(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:
@@ -43,7 +45,7 @@ class Overlays:
         found, self._failures = self._failures, []
         return found
 
-    def _sensors_of(self, deployment: Deployment, layout: Layout, robot: Entity) -> Sequence[FittedSensor]:
+    def _sensors_of(self, deployment: Deployment, layout: Layout, robot: Entity) -> Sequence[BoundSensor]:
         try:
             return sensors_of(deployment, layout, robot)
         except ComponentError as error:
@@ -69,7 +71,7 @@ class Overlays:
                 found += self._rays_of_each(sensors, frame)
         return found
 
-    def _rays_of_each(self, sensors: list[FittedSensor], frame: Frame) -> list[list[float]]:
+    def _rays_of_each(self, sensors: list[BoundSensor], frame: Frame) -> list[list[float]]:
         """Return the rays of sensors that have some; the others are left out from here on."""
         found: list[list[float]] = []
         for fitted in [*sensors]:
@@ -81,7 +83,7 @@ class Overlays:
         return found
 
 
-def _rays_of(sensors: Sequence[FittedSensor], frame: Frame) -> list[list[float]]:
+def _rays_of(sensors: Sequence[BoundSensor], frame: Frame) -> list[list[float]]:
     """Return both ends of each ray (m); absent robots send none. Raises ComponentError, of the first of several."""
     sensors = [fitted for fitted in sensors if not frame.layout[fitted.robot].is_absent(frame.numbers)]
     if not sensors:
@@ -90,11 +92,11 @@ def _rays_of(sensors: Sequence[FittedSensor], frame: Frame) -> list[list[float]]
     return called(f"rays of sensor {first.channel}", first.robot, frame.tick, _drawn, sensors, frame.numbers)
 
 
-def _drawn(sensors: Sequence[FittedSensor], numbers: list[float]) -> list[list[float]]:
-    rays = type(sensors[0].sensor).rays  # type: ignore[attr-defined]
+def _drawn(sensors: Sequence[BoundSensor], numbers: list[float]) -> list[list[float]]:
+    rays = type(sensors[0].sensor).rays
     given = rays([fitted.sensor for fitted in sensors], numbers)
     is_fit = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim == 2 and given.shape[1] == 6
     if not (is_fit and np.isfinite(given).all()):
-        raise WrongResult(rays, "an array of finite numbers of shape (rays, 6)", given)
+        raise ContractError(rays, "an array of finite numbers of shape (rays, 6)", given)
     ends: list[list[float]] = np.round(given, 4).tolist()
     return ends

@@ -78,15 +78,5 @@ class Engine(Protocol):
         """Free what the engine holds. It is not used afterwards."""
 
 
-class EngineKind(Protocol):
-    """What a registered engine is made by: one file in `node/engines/`, or a class of another package.
-
-    Its methods import what the engine needs, so that the registry can tell of it where that is not installed.
-    """
-
-    def make(self, deployment: Deployment, layout: Layout) -> Engine | IslandEngine:
-        """Return an engine, built at once."""
-
-
 AnyEngine: TypeAlias = Engine | IslandEngine
 EngineFactory = Callable[[Deployment, Layout], Engine]

@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from foosim.deployment.schema import Deployment
-from foosim.node.physics.interface import AnyEngine, EngineKind
+from foosim.node.physics.interface import AnyEngine
+from foosim.world.forms import registry
 from foosim.world.layout import Entity, Layout
-
-
-def kind_of(deployment: Deployment) -> EngineKind:
-    """Return the registered engine that a deployment names."""
-    kind: EngineKind = deployment.engine_type.made()
-    return kind
 
 
 class NoEngine:
@@ -40,6 +35,14 @@ def has_rigid(layout: Layout) -> bool:
     return any(entity.is_rigid for entity in layout.entities)
 
 
+def engine_of(deployment: Deployment, layout: Layout) -> AnyEngine:
+    """Return an engine of the kind that a deployment names, built at once."""
+    engine: AnyEngine = registry.class_at(deployment.engine_type.path)(deployment, layout)
+    return engine
+
+
 def make_engine(deployment: Deployment, layout: Layout) -> AnyEngine:
     """Return the engine of a layout's rigid bodies, built at once."""
-    return kind_of(deployment).make(deployment, layout) if has_rigid(layout) else NoEngine()
+    if not has_rigid(layout):
+        return NoEngine()
+    return engine_of(deployment, layout)

@@ -24,7 +24,7 @@ import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Engine, IslandEngine
-from foosim.node.physics.making import kind_of, make_engine
+from foosim.node.physics.making import engine_of, make_engine
 from foosim.protocol.codec import decode_any, encode
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import Entity, build_layout
@@ -125,7 +125,7 @@ def main() -> None:
     name, text, files = decode_any(tuple[str, str, dict[str, bytes]], sys.stdin.buffer.read())
     deployment = load_deployment(text, name).with_assets(files)
     bare = deployment.model_copy(update={"scenery": {}})
-    kind_of(deployment).make(bare, build_layout(deployment)).close()  # imports what it needs
+    engine_of(bare, build_layout(deployment)).close()  # imports what it needs
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_NOFILE, 0)
     _limit(resource.RLIMIT_AS, ADDRESS_SPACE_BYTES)
@@ -148,7 +148,7 @@ def _limit(what: int, value: int) -> None:
 def _try(deployment: Deployment) -> None:
     """Build the world with its one mesh and step it with each free body: from above, and from within a triangle."""
     layout = build_layout(deployment)
-    engine = kind_of(deployment).make(deployment, layout)
+    engine = engine_of(deployment, layout)
     assert not isinstance(engine, IslandEngine), engine
     (shape,) = deployment.scenery_shapes()
     assert isinstance(shape.geometry, Mesh), shape

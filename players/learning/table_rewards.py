@@ -177,7 +177,7 @@ def with_ball(
     entity = frame.layout[ball]
     numbers = frame.numbers.copy()
     made = model_of(deployment, frame.layout, entity)
-    made.place_at(WritableView(frame.tick, numbers), position, velocity)  # type: ignore[attr-defined]
+    made.place_at(WritableView(frame.tick, numbers), position, velocity)
     for field, at in entity.offsets.items():
         if field.startswith("football."):  # what the rules count of it: it waits for no kick-off
             numbers[at : at + entity.counts[field]] = [0.0] * entity.counts[field]

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from foosim.deployment.loader import expanded_text, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
@@ -21,7 +22,7 @@ class BystanderRobot(RobotSettings):
 
 
 @model("bystander", BystanderRobot, slots={"down": 1, "refused": 1}, has_body=False)
-class Bystander:
+class Bystander(Model):
     """A robot without a body, for the check of components."""
 
     def __init__(self, settings: BystanderRobot, at: Mounting) -> None:

@@ -24,12 +24,12 @@ from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings, System
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.assembly.world import World, asked_together
-from foosim.world.components.fitted import FittedActuator, FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundActuator, BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, View, called, has_together, some_together
 from foosim.world.components.watching import ReadOnly
 from foosim.world.forms import registry
-from foosim.world.forms.forms import Form
+from foosim.world.forms.forms import ComponentType
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
 
@@ -40,25 +40,27 @@ NAMED_MAX: Final = 4
 """Actuators that a message about several names."""
 
 
-def used_form(text: str, name: str, wanted: str) -> Form:
+def used_form(text: str, name: str, wanted: str) -> ComponentType:
     """Return the form of a deployment that is wanted: a name, a form and a name, or module:Class.
 
     Raises BadValue where the deployment uses none or several of that name.
     """
     forms = forms_of(load_deployment(text, name))
-    labels = {f"{form.form} {form.name}": form for form in forms}
+    labels = {f"{form.type_name} {form.name}": form for form in forms}
     if wanted in labels:
         return labels[wanted]
     form_name, _, kind = wanted.rpartition(" ")
     made = registry.class_at(kind) if ":" in kind else None
-    found = [form for form in forms if form_name in ("", form.form) and (kind == form.name or made is form.made)]
+    found = [
+        form for form in forms if form_name in ("", form.type_name) and (kind == form.name or made is form.factory)
+    ]
     if len(found) == 1:
         return found[0]
     if found:
-        which = " or ".join(f"{form.form} {form.name}" for form in found)
-        raise BadValue(f"several forms of {name} are called this: {which}", wanted)
+        which = " or ".join(f"{form.type_name} {form.name}" for form in found)
+        raise BadValue(f"several components of {name} are called this: {which}", wanted)
     choices = [*labels] if " " in wanted or ":" in wanted else [form.name for form in forms]
-    raise UnknownName(f"{name} uses no form called this", wanted, choices)
+    raise UnknownName(f"{name} uses no component called this", wanted, choices)
 
 
 @dataclass
@@ -216,7 +218,7 @@ class _Fitted:
         """The actuators that can be asked together, by motion and class, in the order of their robots."""
         self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
 
-    def due(self, frame: Frame) -> list[FittedSensor]:
+    def due(self, frame: Frame) -> list[BoundSensor]:
         """Return the sensors that measure a frame."""
         return [one for one in self._sensors if one.is_due(frame.tick, frame.numbers)]
 
@@ -227,14 +229,14 @@ class _Fitted:
         return {(sensor.robot, sensor.channel): payload for sensor, payload in zip(due, payloads, strict=True)}
 
 
-def _together(deployment: Deployment, layout: Layout) -> list[list[FittedActuator]]:
-    found: dict[tuple[str, str], list[FittedActuator]] = {}
+def _together(deployment: Deployment, layout: Layout) -> list[list[BoundActuator]]:
+    found: dict[tuple[str, str], list[BoundActuator]] = {}
     for index, actuators in sorted(World(deployment, layout).actuators.items()):
         motion = layout.entities[index].kind.motion
         for one in actuators:
             kind = type(one.actuator)
-            if motion and has_together(kind, "command"):
-                found.setdefault((motion, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
+            if motion is not None and has_together(kind, "command"):
+                found.setdefault((motion.__qualname__, f"{kind.__module__}.{kind.__qualname__}"), []).append(one)
     return list(found.values())
 
 
@@ -269,12 +271,12 @@ class _Compared:
                     label, f"{label} gives another reading alone than with others, at tick {frame.tick}"
                 )
 
-    def ask(self, actuators: Sequence[FittedActuator], frame: Frame) -> None:
+    def ask(self, actuators: Sequence[BoundActuator], frame: Frame) -> None:
         """Compare what actuators of one class ask for in a frame, as `measure` does. Raises ComponentError."""
         view = View(frame.tick, ReadOnly(frame.numbers), start=frame.numbers)
         members = [one.actuator for one in actuators]
         what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in actuators[:NAMED_MAX])}"
-        made = called(what, "", frame.tick, type(members[0]).together, members)  # type: ignore[attr-defined]
+        made = called(what, "", frame.tick, type(members[0]).together, members)
         together = some_together(what, frame.tick, made, members, np.arange(len(members))[::-1])
         asked = asked_together(what, together, len(actuators), view)[::-1]
         for one, its in zip(actuators, asked.tolist(), strict=True):

@@ -27,6 +27,7 @@ from pydantic import Field
 
 from foosim.common.spec_base import SpecBase
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import Sensor
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
 
@@ -50,7 +51,7 @@ class Number(Struct, frozen=True):
 
 
 @sensor("bounded", Settings, Number)
-class Bounded:
+class Bounded(Sensor):
     """Has bounds."""
 '''
 
@@ -84,19 +85,13 @@ TOLD: Final = {
         "slots of each ball: still_ticks, out_ticks, wait_ticks, spot[2], serve, touched_by",
         "writes: ball",
     ],
-    ("motion", "differential_drive"): [
-        "needs a model with: position, orientation, linear_velocity, angular_velocity, heading, wheel_speeds, "
-        "wheel_travel, blocked",
-        "writes: position, orientation, linear_velocity, angular_velocity, heading, wheel_speeds, wheel_travel, "
-        "blocked",
-    ],
     ("model", "rover"): [
         "sensors: by name: of sensors, see components sensor (default {})",
         "actuators: by name: of actuators, see components actuator (default {})",
         "rules: by name: of entity_rules, see components entity_rule (default {})",
         "tags: a list, each: string (default [])",
         "a robot",
-        "moved by: differential_drive",
+        "moved by: WheeledMotion",
         "usual actuators: drive (wheel_speeds)",
         "usual rules: battery (battery)",
         "tags: vehicle",
@@ -104,12 +99,12 @@ TOLD: Final = {
     ("model", "ball"): ["no robot: nobody owns it", "moved by: an engine"],
     ("model", "station"): ["moved by: nothing"],
     ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)"],
-    ("model", "fire"): ["can be set: at (a pose), radius (0 m to 100 m)", "moved by: fire", "tags: fire"],
+    ("model", "fire"): ["can be set: at (a pose), radius (0 m to 100 m)", "moved by: Growing", "tags: fire"],
     ("model", "door"): ["can be set: open (0 % to 100 %, or true or false)"],
     ("rule", "wind"): ["can be set: x (-100 m/s to 100 m/s), y (-100 m/s to 100 m/s), z (-100 m/s to 100 m/s)"],
     ("entity_rule", "battery"): ["slots: charge", "slots that are the model's where it has them: charge"],
     ("model", "differential_drive"): [
-        "moved by: differential_drive",
+        "moved by: WheeledMotion",
         "with dynamics: rigid, moved by: an engine; slots: position[3], orientation[4], linear_velocity[3], "
         "angular_velocity[3], contacts[3], partners[4], partner_impulses[4], still_ticks, quarantined, "
         "joint_positions[2], joint_velocities[2], joint_efforts[2], heading, wheel_speeds[2], wheel_travel[2], down, "
@@ -127,13 +122,10 @@ def test_a_form_is_told_of_with_what_it_brings(told: Telling, about: tuple[str, 
 
 def test_all_are_told_of_in_json(told: Telling) -> None:
     found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])["components"]
-    assert [(one["form"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
-    by_name = {(one["form"], one["name"]): one for one in found}
+    assert [(one["type"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
+    by_name = {(one["type"], one["name"]): one for one in found}
     rover, football = by_name["model", "rover"], by_name["rule", "football"]
-    assert (rover["motion"], rover["is_robot"], rover["is_rigid"], rover["tags"]) == (
-        *("differential_drive", True, False),
-        ["vehicle"],
-    )
+    assert (rover["mover"], rover["is_robot"], rover["tags"]) == ("WheeledMotion", True, ["vehicle"])
     assert rover["actuators"] == {"drive": {"kind": "wheel_speeds"}} and rover["rules"]["battery"]["kind"] == "battery"
     assert football["writes"] == ["ball"] and football["each"]["ball"]["still_ticks"] == 1
     assert by_name["kit", "table"]["entities"] == {"ball": "ball"}
@@ -166,7 +158,7 @@ def test_what_modules_print_is_not_in_the_schema(told: Telling) -> None:
 
 
 def test_a_name_in_place_of_a_form_is_told_its_form() -> None:
-    with pytest.raises(UnknownName, match=r"unknown form; is it sensor pose\? \(there are: "):
+    with pytest.raises(UnknownName, match=r"unknown component type; is it sensor pose\? \(there are: "):
         chosen("pose", None)
 
 

@@ -24,7 +24,8 @@ import sys
 import numpy as np
 from msgspec import Struct
 from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import entity_rule, rule, sensor
+from foosim.world.components.base import EntityRule, Rule, Sensor
+from foosim.world.forms.registry import rule, sensor
 from foosim.world.forms.settings import *
 
 acts = {}
@@ -41,7 +42,7 @@ class Reading(Struct, frozen=True):
 
 
 @sensor("shown_beam", SensorSettings, Reading)
-class Beam:
+class Beam(Sensor):
     def __init__(self, settings, at):
         self.robot = at.robot.name
 
@@ -54,7 +55,7 @@ class Beam:
 
 
 @rule("shown_rule", RuleSettings)
-class Marks:
+class Marks(Rule):
     def __init__(self, settings, at):
         pass
 
@@ -65,8 +66,8 @@ class Marks:
         yield act("rule", (after.tick, "tells", "all is well"))
 
 
-@entity_rule("shown_wears", EntityRuleSettings)
-class Wears:
+@rule("shown_wears", EntityRuleSettings)
+class Wears(EntityRule):
     def __init__(self, settings, at):
         self.robot = at.robot.name
 
@@ -116,8 +117,14 @@ Act = str | Callable[[], Any]
     [
         ("raise", f"ValueError: no more {ACT}"),
         (lambda: sys.exit(0), "SystemExit: 0"),
-        (lambda: [0.0] * 5, "rays gives array([[0., 0., 0., 0., 0.]]), where an array of finite numbers of shape "),
-        (lambda: [float("nan")] * 6, "rays gives array([[nan, nan, nan, nan, nan, nan]]), where an array of finite "),
+        (
+            lambda: [0.0] * 5,
+            "rays() returned array([[0., 0., 0., 0., 0.]]); expected an array ",
+        ),
+        (
+            lambda: [float("nan")] * 6,
+            "rays() returned array([[nan, nan, nan, nan, nan, nan]]); expected an ",
+        ),
     ],
 )
 def test_rays_that_fail_are_named_once_and_the_others_drawn(forms: Any, act: Act, said: str) -> None:
@@ -148,8 +155,8 @@ def marks(tick: int, events: WorldEvents, frame: Frame) -> list[Mark]:
     ("act", "said"),
     [
         ("raise", f"ValueError: no more {ACT}"),
-        (lambda: 3, "marks gives 3, where a mark (tick, kind, text) is needed {}"),
-        (lambda: (1.5, "tells", "x"), "marks gives (1.5, 'tells', 'x'), where a mark (tick, kind, text) is needed {}"),
+        (lambda: 3, "marks() returned 3; expected a mark (tick, kind, text) {}"),
+        (lambda: (1.5, "tells", "x"), "marks() returned (1.5, 'tells', 'x'); expected a mark (tick, kind, text) {}"),
     ],
 )
 def test_marks_that_fail_are_a_mark_and_the_others_told(forms: Any, name: str, act: Act, said: str) -> None:

@@ -22,7 +22,7 @@ from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.launcher.liveness import WAITS_S
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.world.forms.per_field import numbers_of, read_per_field
-from foosim.world.forms.registry import find, find_component, find_model
+from foosim.world.forms.registry import find, find_component, find_engine, find_model
 from foosim.world.forms.settings import ComponentSettings
 from foosim.world.models.camera import CameraRobot
 from foosim.world.models.rod import RodRobot
@@ -182,7 +182,7 @@ def test_all_texts_of_a_deployment_are_the_same_deployment(name: str, sets: tupl
 def test_settings_know_their_component_type_and_so_do_copies(name: str) -> None:
     loaded = load_deployment((DEPLOY / name).read_text(), name)
     for one in (loaded, loaded.model_copy(update={"seed": 9})):
-        assert one.engine_type is find("engine", one.engine) and [*one.kit_types] == sorted(one.kits)
+        assert one.engine_type is find_engine(one.engine) and [*one.kit_types] == sorted(one.kits)
         typed: list[tuple[str, ComponentSettings]] = [("rule", rule) for rule in one.world_rules.values()]
         for robot in one.robots.values():
             model = find_model(robot.model).variant(getattr(robot, "dynamics", None))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 from foosim.cli.components import as_json
-from foosim.world.forms.forms import Form
+from foosim.world.forms.forms import ComponentType
 from tests.forms.worlds import Place, World
 
 QUANTITY: Final = re.compile(r"[\w ]+, (\S+) (.+?) to (\S+) (.+?): a number and one of .*")
@@ -29,7 +29,7 @@ class Edge(NamedTuple):
         return f"{'.'.join(map(str, self.place))}={self.value!r}"
 
 
-def edges(form: Form, world: World) -> Iterator[Edge]:
+def edges(form: ComponentType, world: World) -> Iterator[Edge]:
     """Yield the limits of each of a form's settings that has any, and what lies just beyond."""
     if not world.place:
         return

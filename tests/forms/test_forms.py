@@ -34,7 +34,7 @@ OF_FILES: Final = [("model", "urdf"), *(("actuator", name) for name in ("joint_t
 """What only a robot from a file has, which a text alone does not bring: tests/whole_worlds.py has them."""
 ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
 EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
-ALONE: Final = {("engine", "pure"), ("scene", "football_table"), ("scene", "hall")}
+ALONE: Final = {("scene", "football_table"), ("scene", "hall")}
 """What no world of tests/whole_worlds.py has: each has one engine and one scene."""
 EACH_ALONE: Final = pytest.mark.parametrize(
     "key", [pytest.param(key, marks=() if key in ALONE else pytest.mark.campaign) for key in ALL], ids="-".join
@@ -44,13 +44,13 @@ EACH_ALONE: Final = pytest.mark.parametrize(
 @cache
 def own() -> list[tuple[str, str]]:
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    return sorted((form.form, form.name) for form in found if form.module == own_module(form.form, form.name))
+    return sorted((form.type_name, form.name) for form in found if form.module == own_module(form.type_name, form.name))
 
 
 def test_every_form_has_a_world_of_its_own() -> None:
     assert sorted([*WORLDS, *OF_FILES]) == own()
     for (form, name), world in WORLDS.items():
-        used = {(found.form, found.name) for found in forms_of(load_deployment(world.text(), NAME))}
+        used = {(found.type_name, found.name) for found in forms_of(load_deployment(world.text(), NAME))}
         assert (form, name) in used
 
 

@@ -359,14 +359,8 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("model", "holonomic"): World(YARD.data, ("robots", "base")),
     ("model", "mover"): World(YARD.data, ("robots", "door")),
     ("model", "rotorcraft"): World(YARD.data, ("robots", "craft")),
-    ("motion", "differential_drive"): HALL,
     ("model", "door"): World(YARD.data, ("objects", "gate")),
     ("model", "fire"): World(YARD.data, ("objects", "fire")),
-    ("motion", "door"): YARD,
-    ("motion", "fire"): YARD,
-    ("motion", "holonomic"): YARD,
-    ("motion", "rotorcraft"): YARD,
-    ("motion", "track"): YARD,
     ("sensor", "ball"): sensor(TABLE, ["camera"], "ball"),
     ("sensor", "ball_state"): sensor(TABLE, ["camera"], "ball_state"),
     ("sensor", "battery"): sensor(HALL, ROVERS, "battery"),
@@ -438,9 +432,6 @@ WORLDS: Final[Mapping[tuple[str, str], World]] = {
     ("scene", "hall"): scene(TABLE, "hall", {key: HALL.data["hall"][key] for key in ("length", "width", "walls")}),
     ("kit", "hall"): World(HALL.data, ("hall",)),
     ("kit", "table"): World(TABLE.data, ("table",)),
-    ("engine", "bullet"): TABLE.with_(("engine",), "bullet", ()),
-    ("engine", "mujoco"): SOLIDS,
-    ("engine", "pure"): TABLE,
 }
 
 VARIANTS: Final[Mapping[tuple[str, str, str], World]] = {

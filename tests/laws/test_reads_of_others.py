@@ -32,12 +32,13 @@ from foosim.world.actuators.wheel_speeds import Drive, DriveActuator
 from msgspec import Struct
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import actuator, entity_rule, sensor
+from foosim.world.components.base import EntityRule, Sensor
+from foosim.world.forms.registry import actuator, rule, sensor
 from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, SensorSettings
 
 
-@entity_rule("follows", EntityRuleSettings, slots={"seen": 1, "set_point": 2, "near": 1})
-class Follows:
+@rule("follows", EntityRuleSettings, slots={"seen": 1, "set_point": 2, "near": 1})
+class Follows(EntityRule):
     def __init__(self, settings, at):
         self.near, self.around = at.slot("near"), Surroundings(at.spec, at.layout)
         rovers = at.layout.of("rover")
@@ -58,7 +59,7 @@ class Near(Struct, frozen=True):
 
 
 @sensor("neighbours", SensorSettings, Near, needs=("position",))
-class Neighbours:
+class Neighbours(Sensor):
     def __init__(self, settings, at):
         self.own, self.around = at.slot("position"), Surroundings(at.spec, at.layout)
 

@@ -35,7 +35,8 @@ import numpy as np
 from msgspec import Struct
 from foosim.world.actuators.rod_position import Command, RodPositionSettings, PositionActuator
 from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import actuator, entity_rule, modifier, rule, sensor
+from foosim.world.components.base import EntityRule, Modifier, Rule, Sensor
+from foosim.world.forms.registry import actuator, modifier, rule, sensor
 from foosim.world.forms.settings import EntityRuleSettings, ModifierSettings, RuleSettings, SensorSettings
 
 acts = {}
@@ -60,7 +61,7 @@ class Pair(Struct, frozen=True):
 
 
 @sensor("misdeed", SensorSettings, Reading)
-class Own:
+class Own(Sensor):
     def __init__(self, settings, at):
         pass
 
@@ -69,7 +70,7 @@ class Own:
 
 
 @sensor("misdeed_says", SensorSettings, Words)
-class Says:
+class Says(Sensor):
     def __init__(self, settings, at):
         pass
 
@@ -78,7 +79,7 @@ class Says:
 
 
 @sensor("misdeed_batched", SensorSettings, Pair)
-class Batched:
+class Batched(Sensor):
     def __init__(self, settings, at):
         pass
 
@@ -96,7 +97,7 @@ class Batch:
 
 
 @modifier("misdeed_bends", ModifierSettings)
-class Bends:
+class Bends(Modifier):
     def __init__(self, settings, at):
         pass
 
@@ -114,7 +115,7 @@ class Drive(PositionActuator):
 
 
 @rule("misdeed_rules", RuleSettings)
-class Rules:
+class Rules(Rule):
     def __init__(self, settings, at):
         pass
 
@@ -122,8 +123,8 @@ class Rules:
         act("rule", view, None)
 
 
-@entity_rule("misdeed_wears", EntityRuleSettings)
-class Wears:
+@rule("misdeed_wears", EntityRuleSettings)
+class Wears(EntityRule):
     def __init__(self, settings, at):
         pass
 
@@ -205,46 +206,58 @@ def gives(value: Any) -> Act:
 OWN: Final = "sensor own of red.goal"
 BENT: Final = "modifier misdeed_bends of own of red.goal"
 MOTORS: Final = "actuator motors of red.goal"
-SAMPLE: Final = "sample gives {}, where a Reading is needed (misdeeds.py:"
+SAMPLE: Final = "sample() returned {}; expected a Reading (misdeeds.py:"
 MISDEEDS: Final[dict[str, tuple[str, Act, str]]] = {
     "a sensor that raises": ("sensor", fails, f"{OWN} failed at tick 25: ValueError: no more ("),
     "a sensor that leaves": ("sensor", leave, f"{OWN} failed at tick 25: SystemExit: 0 ("),
     "a sensor without a reading": ("sensor", gives(None), f"{OWN} failed at tick 25: {SAMPLE.format(None)}"),
     "a sensor with a number": ("sensor", gives(3.0), f"{OWN} failed at tick 25: {SAMPLE.format(3.0)}"),
-    "another type in words": ("words", gives(3.0), "sensor says of red.goal failed at tick 25: sample gives 3.0"),
+    "another type in words": ("words", gives(3.0), "sensor says of red.goal failed at tick 25: sample() returned 3.0"),
     "an array of another shape": (
         "batch",
         gives(np.zeros((2, 1))),
-        "sensor pair of red.attack, pair of red.goal failed at tick 25: sample gives array([[0.],",
+        "sensor pair of red.attack, pair of red.goal failed at tick 25: sample() returned array([[0.],",
     ),
     "a list in place of an array": (
         "batch",
         gives([[1.0, 2.0]] * 2),
-        "pair of red.goal failed at tick 25: sample gives [[1.0, 2.0], [1.0, 2.0]], where an array of float64 of the "
-        "shape (2, 2) is needed (misdeeds.py:",
+        "pair of red.goal failed at tick 25: sample() returned [[1.0, 2.0], [1.0, 2.0]]; expected an array "
+        "of float64 of the shape (2, 2) (misdeeds.py:",
     ),
-    "a modifier that gives a number": ("modifier", gives(3.0), f"{BENT} failed at tick 25: apply gives 3.0, where a "),
-    "a modifier that gives texts": ("modifier", gives(["x"]), f"{BENT} failed at tick 25: apply gives ['x'], where a "),
+    "a modifier that gives a number": (
+        "modifier",
+        gives(3.0),
+        f"{BENT} failed at tick 25: apply() returned 3.0; expected a ",
+    ),
+    "a modifier that gives texts": (
+        "modifier",
+        gives(["x"]),
+        f"{BENT} failed at tick 25: apply() returned ['x']; expected a ",
+    ),
     "a modifier that gives too few": (
         "modifier",
         gives([]),
-        f"{BENT} failed at tick 25: apply gives [], where a list of 1 numbers, or None, is needed (misdeeds.py:",
+        f"{BENT} failed at tick 25: apply() returned []; expected a list of 1 numbers, or None (misdeeds.py:",
     ),
     "a modifier that leaves": ("modifier", leave, f"{BENT} failed at tick 25: SystemExit: 0 ("),
     "a command neither taken nor refused": (
         "accept",
         gives(None),
-        f"{MOTORS} failed at tick 25: accept gives None, where True or False is needed (misdeeds.py:",
+        f"{MOTORS} failed at tick 25: accept() returned None; expected True or False (misdeeds.py:",
     ),
     "an actuator that leaves": ("accept", leave, f"{MOTORS} failed at tick 25: SystemExit: 0 ("),
     "motors of texts": (
         "command",
         gives((("x", 1.0), (0.0, 1.0))),
-        f"{MOTORS} failed at tick 25: command gives (('x', 1.0), (0.0, 1.0)), where a tuple of (target, greatest force)"
-        " for 2 motors is needed (misdeeds.py:",
+        f"{MOTORS} failed at tick 25: command() returned (('x', 1.0), (0.0, 1.0)); expected a tuple of "
+        "(target, greatest force) for 2 motors (misdeeds.py:",
     ),
-    "one motor of two": ("command", gives(((0.0, 1.0),)), f"{MOTORS} failed at tick 25: command gives ((0.0, 1.0),)"),
-    "no motors": ("command", gives(None), f"{MOTORS} failed at tick 25: command gives None, where a tuple of "),
+    "one motor of two": (
+        "command",
+        gives(((0.0, 1.0),)),
+        f"{MOTORS} failed at tick 25: command() returned ((0.0, 1.0),)",
+    ),
+    "no motors": ("command", gives(None), f"{MOTORS} failed at tick 25: command() returned None; expected a tuple of "),
     "a rule that leaves": ("rule", leave, "rule rules of the world failed at tick 25: SystemExit: 0 ("),
     "a rule of a robot that leaves": ("wears", leave, "rule wears of red.goal failed at tick 25: SystemExit: 0 ("),
     "a write to the array of a frame": (
@@ -256,13 +269,13 @@ MISDEEDS: Final[dict[str, tuple[str, Act, str]]] = {
 MISDEEDS["a text in a number"] = (
     "sensor",
     lambda view: import_module("misdeeds").Reading("x"),
-    f"{OWN} failed at tick 25: sample gives Reading(x='x'), where a reading of 1 numbers is needed (misdeeds.py:",
+    f"{OWN} failed at tick 25: sample() returned Reading(x='x'); expected a reading of 1 numbers (misdeeds.py:",
 )
 MISDEEDS["a text in a number of words"] = (
     "words",
     lambda view: import_module("misdeeds").Words("so", "x"),
-    "says of red.goal failed at tick 25: sample gives Words(text='so', x='x'), where misdeed_says: Expected `float`, "
-    "got `str` - at `$.x` is needed (misdeeds.py:",
+    "says of red.goal failed at tick 25: sample() returned Words(text='so', x='x'); expected misdeed_says: "
+    "Expected `float`, got `str` - at `$.x` (misdeeds.py:",
 )
 
 
@@ -396,6 +409,6 @@ def test_a_deployment_with_a_text_in_a_number_is_refused(tmp_path: Path, monkeyp
     monkeypatch.syspath_prepend(str(tmp_path))
     own = f"robots.red.goal.sensors.own={{{KIND.format('Own')}}}".replace("misdeeds", "says_texts")
     with pytest.raises(
-        DeploymentError, match=r"sensor own of red\.goal failed at tick 1: sample gives Reading\(x='x'\)"
+        DeploymentError, match=r"sensor own of red\.goal failed at tick 1: sample\(\) returned Reading\(x='x'\)"
     ):
         load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure", own]), TABLE.name)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import jsonschema
 import pytest
 
-from foosim.cli.components import as_json, chosen, lines
 from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -20,6 +19,7 @@ from foosim.simulation.run import rehearse
 from foosim.world.assembly import world
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms import registry
+from foosim.world.forms.forms import ENGINES
 from foosim.world.layout import build_layout
 from foosim.world.parameters.table import table_of
 from foosim.world.scene import Scene, Sphere, Vector
@@ -29,13 +29,13 @@ from tests.shared_engine import make_shared_engine
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
 STILL: Final = '''
-from foosim.world.forms.registry import engine
+from foosim.world.forms.forms import ENGINES, Engine
 
 
-class Engine:
+class Still:
     """All that it has is where bodies were, and one of them moves."""
 
-    def __init__(self, layout):
+    def __init__(self, deployment, layout):
         self.layout = layout
 
     def load(self, entities, state):
@@ -58,30 +58,25 @@ class Engine:
         """It holds nothing."""
 
 
-@engine("still", meshes=False)
-class Still:
-    """Moves nothing but the ball."""
-
-    def make(self, deployment, layout):
-        return Engine(layout)
+ENGINES["still"] = Engine("still", "own_still:Still")
 '''
 
 
 @pytest.fixture
-def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder on the path with somebody's engine."""
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What pip leaves of a package whose entry point is a module with an engine."""
+    known = dict(ENGINES)
     (tmp_path / "own_still.py").write_text(STILL)
     monkeypatch.syspath_prepend(str(tmp_path))
-    return tmp_path
-
-
-def install(folder: Path) -> None:
-    """Leave what pip leaves of a package whose entry point is the module."""
-    about = folder / "still-1.0.dist-info"
+    about = tmp_path / "still-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: still\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text("[foosim.world]\nstill = own_still\n")
     registry._entry_points.cache_clear()
+    registry._loaded.clear()
+    yield
+    ENGINES.clear()
+    ENGINES.update(known)
 
 
 def problem(*sets: str) -> str:
@@ -90,71 +85,32 @@ def problem(*sets: str) -> str:
     return str(error.value)
 
 
-def test_finding_an_engine_imports_nothing_that_it_needs() -> None:
+def test_names_of_engines_import_nothing_that_they_need() -> None:
     code = """
 import json, sys
 from foosim.world.forms import registry
-found = [registry.find("engine", name) for name in registry.names("engine")]
+from foosim.world.forms.forms import ENGINES
 heavy = ("numpy", "pybullet", "foosim.node.physics.interface", "foosim.deployment.schema")
-print(json.dumps([[one.name, one.meshes] for one in found] + [name for name in heavy if name in sys.modules]))
+print(json.dumps([*registry.engines(), *[name for name in heavy if name in sys.modules]]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout) == [["bullet", True], ["mujoco", True], ["pure", False]]
+    assert json.loads(done.stdout) == ["bullet", "mujoco", "pure"]
 
 
-@pytest.mark.usefixtures("site")
-def test_an_engine_of_ones_own_computes_a_run() -> None:
-    result = rehearse(TEXT, TABLE.name, 20, 2, ["engine=own_still:Still"])
-    assert result.json["ticks"] == 20 and result.json["failed"] is False
-
-
-@pytest.mark.usefixtures("site")
-def test_its_class_is_what_a_node_makes() -> None:
-    deployment = load_deployment(apply_sets(TEXT, TABLE.name, ["engine=own_still:Still"]), TABLE.name)
-    assert type(make_shared_engine(deployment, build_layout(deployment))).__module__ == "own_still"
-
-
-def test_an_installed_engine_is_known_by_its_name(site: Path) -> None:
-    assert "unknown engine (there are: bullet, mujoco, pure, or any module:Class), 'still'" in problem("engine=still")
-    install(site)
-    assert registry.names("engine") == ["bullet", "mujoco", "pure", "still"]
-    known = "bullet, mujoco, pure, still, or any module:Class"
-    assert f"engine: unknown engine (there are: {known}), 'stil', nearest is 'still'" in problem("engine=stil")
-    apply_sets(TEXT, TABLE.name, ["engine=still"])
-    (own,), (installed,) = (
-        [one["enum"] for one in deployment_schema(installed=theirs)["properties"]["engine"]["anyOf"] if "enum" in one]
-        for theirs in (False, True)
+@pytest.mark.usefixtures("installed")
+def test_an_engine_of_ones_own_computes_a_run_and_is_in_its_schema_and_messages() -> None:
+    assert "engine: unknown engine (there are: bullet, mujoco, pure, still), 'stil', nearest is 'still'" in problem(
+        "engine=stil"
     )
-    assert (own, installed) == (["bullet", "mujoco", "pure"], ["bullet", "mujoco", "pure", "still"])
-    (told,) = chosen("engine", "still")
-    assert as_json(told)["meshes"] is False and as_json(told)["class"] == "own_still:Still"
-    assert list(lines(told)) == ["engine still, of own_still:Still", "  Moves nothing but the ball."]
-
-
-@pytest.mark.usefixtures("site")
-def test_an_engine_without_meshes_says_so() -> None:
+    result = rehearse(TEXT, TABLE.name, 20, 2, ["engine=still"])
+    assert result.json["ticks"] == 20 and result.json["failed"] is False
+    deployment = load_deployment(apply_sets(TEXT, TABLE.name, ["engine=still"]), TABLE.name)
+    assert type(make_shared_engine(deployment, build_layout(deployment))).__module__ == "own_still"
+    enums = [deployment_schema(installed=theirs)["properties"]["engine"]["enum"] for theirs in (False, True)]
+    assert enums == [["bullet", "mujoco", "pure"], ["bullet", "mujoco", "pure", "still"]]
     mesh = "scenery={shard: {shape: mesh, file: shard.obj}}"
-    assert "scenery.shard.shape: the engine own_still:Still has no meshes" in problem("engine=own_still:Still", mesh)
-
-
-@pytest.mark.usefixtures("site")
-@pytest.mark.parametrize(
-    ("engine", "reason"),
-    [
-        ("own_absent:Engine", "engine: there is no module own_absent"),
-        ("own_still:Engine", "engine: not registered as an engine"),
-        ("own_still:Stil", "engine: there is no Stil in own_still (there are: "),
-        ("foosim.world.sensors.pose:PoseTracker", "engine: not registered as an engine"),
-        ("3", "engine: not a text, 3"),
-    ],
-)
-def test_what_is_no_engine_is_refused_at_its_place(engine: str, reason: str) -> None:
-    assert reason in problem(f"engine={engine}")
-
-
-@pytest.mark.parametrize(("engine", "is_valid"), [("pure", True), ("a.b:C", True), ("bulet", False), (3, False)])
-def test_the_schema_takes_a_name_or_a_class(engine: object, is_valid: bool) -> None:
-    assert jsonschema.Draft202012Validator(deployment_schema()["properties"]["engine"]).is_valid(engine) is is_valid
+    assert "scenery.shard.shape: the engine still has no meshes" in problem("engine=still", mesh)
+    assert "engine: not a text, 3" in problem("engine=3")
 
 
 @pytest.mark.parametrize("engine", ["bullet", "pure"])

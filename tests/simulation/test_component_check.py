@@ -37,6 +37,7 @@ from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import Mounting
 from foosim.world.forms.forms import ENTITY
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import EntityRule, Rule, Sensor
 from foosim.world.forms.registry import rule, sensor
 from foosim.world.forms.settings import RuleSettings, SensorSettings
 
@@ -51,7 +52,7 @@ class Settings(SensorSettings):
 SENSOR: Final = """
 
 @sensor("own", Settings, Number, slots={{"kept": 1}}, needs=("joint_positions",))
-class Own:
+class Own(Sensor):
     def __init__(self, settings, at):
         self.at, self.kept, self.joints = at, at.slot("kept"), at.slot("joint_positions")
         self.count = 0
@@ -69,7 +70,7 @@ class OwnSettings(RuleSettings):
 
 
 @rule("own", OwnSettings, slots={"sum": 16})
-class Own:
+class Own(Rule):
     def __init__(self, settings, at):
         self.sum = at.slot("sum")
         self.joints = [at.of(rod, "joint_positions") for rod in at.layout.of("rod")]
@@ -214,15 +215,15 @@ def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monke
 
 def test_a_form_is_named_as_deployments_do() -> None:
     text = TABLE.read_text()
-    assert used_form(text, TABLE.name, "encoder").form == "sensor"
+    assert used_form(text, TABLE.name, "encoder").type_name == "sensor"
     assert used_form(text, TABLE.name, "rule football").name == "football"
-    assert used_form(text, TABLE.name, "foosim.world.models.rod:Rod").form == "model"
-    assert used_form(text, TABLE.name, "model foosim.world.models.rod:Rod").form == "model"
+    assert used_form(text, TABLE.name, "foosim.world.models.rod:Rod").type_name == "model"
+    assert used_form(text, TABLE.name, "model foosim.world.models.rod:Rod").type_name == "model"
 
 
 WRONG: Final = {
-    "encodr": "table.yaml uses no form called this (there are: ball, camera, delay, encoder, football, "
-    "gaussian_noise, pure, rod, rod_position, table), 'encodr', nearest is 'encoder'",
+    "encodr": "table.yaml uses no component called this (there are: ball, camera, delay, encoder, football, "
+    "gaussian_noise, rod, rod_position, table), 'encodr', nearest is 'encoder'",
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
     "foosim.world.models.rod:Rot": "nearest is 'foosim.world.models.rod:Rod'",
@@ -243,9 +244,9 @@ def test_a_name_of_several_forms_says_which(planted: Path) -> None:
         HEAD + SENSOR.format(value=GOOD) + "\n\nFirst = Own\n" + RULE.replace("APPLY", "pass")
     )
     text = apply_sets(TABLE.read_text(), TABLE.name, [OF_ROD.replace(":Own", ":First"), OF_WORLD])
-    with pytest.raises(BadValue, match=r"several forms of table\.yaml are called this: rule own or sensor own, 'own'"):
+    with pytest.raises(BadValue, match=r"several components of table\.yaml are called this: rule own or sensor own"):
         used_form(text, TABLE.name, "own")
-    assert used_form(text, TABLE.name, "rule own").form == "rule"
+    assert used_form(text, TABLE.name, "rule own").type_name == "rule"
 
 
 def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
@@ -258,8 +259,8 @@ def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
 
 SPEAKS: Final = """
 
-@sensor("own", Settings, Number, needs=("contacts",), speaks="contacts")
-class Own:
+@sensor("own", Settings, Number, needs=("contacts",), trigger="contacts")
+class Own(Sensor):
     def __init__(self, settings, at):
         self.contacts = at.slot("contacts")
 
@@ -286,8 +287,8 @@ def test_a_sensor_that_speaks_is_heard_at_each_tick_of_a_contact(planted: Path) 
 
 ALARMS: Final = """
 
-@sensor("own", Settings, Number, slots={"alarm": 1}, speaks="SPEAKS")
-class Own:
+@sensor("own", Settings, Number, slots={"alarm": 1}, trigger="TRIGGER")
+class Own(Sensor):
     def __init__(self, settings, at):
         self.alarm = at.slot("alarm")
 
@@ -300,8 +301,8 @@ class Alarming(EntityRuleSettings):
     pass
 
 
-@entity_rule("own", Alarming, slots={"alarm": 1})
-class Alarms:
+@rule("own", Alarming, slots={"alarm": 1})
+class Alarms(EntityRule):
     def __init__(self, settings, at):
         self.alarm = at.slot("alarm")
 
@@ -314,31 +315,27 @@ HEARD: Final = {
 }
 
 
-@pytest.mark.parametrize("speaks", HEARD)
-def test_a_sensor_speaks_by_a_slot_of_its_own_or_of_a_rule(planted: Path, speaks: str) -> None:
+@pytest.mark.parametrize("trigger", HEARD)
+def test_the_trigger_of_a_sensor_is_a_slot_of_its_own_or_of_a_rule(planted: Path, trigger: str) -> None:
     """Its own slot is set for the tick after the one at which it measures, a rule's for the tick after it applied."""
-    head = HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
-        "import RuleSettings", "import EntityRuleSettings, RuleSettings"
-    )
-    (planted / "own_form.py").write_text(head + ALARMS.replace("SPEAKS", speaks))
+    head = HEAD.replace("import RuleSettings", "import EntityRuleSettings, RuleSettings")
+    (planted / "own_form.py").write_text(head + ALARMS.replace("TRIGGER", trigger))
     rules = "robots.red.goal.rules={beeps: {kind: 'own_form:Alarms'}}"
     frames = Frames()
     done = rehearse(TABLE.read_text(), TABLE.name, 31, 2, [*SETS, OF_ROD, rules], Settings(on_commit=frames))
     assert not done.json["failed"]
     measured = [frame.at("red.goal", "own.samples") for frame in frames.frames]
     ticks = [tick for tick, (before, now) in enumerate(zip([0.0, *measured], measured, strict=False)) if now > before]
-    assert ticks == sorted(set(HEARD[speaks]))
+    assert ticks == sorted(set(HEARD[trigger]))
 
 
 def test_a_slot_that_nobody_has_is_refused_with_what_may_be_named(planted: Path) -> None:
     (planted / "own_form.py").write_text(
-        HEAD.replace("import rule, sensor", "import entity_rule, rule, sensor").replace(
-            "import RuleSettings", "import EntityRuleSettings, RuleSettings"
-        )
-        + ALARMS.replace("SPEAKS", "beeps.alarm")
+        HEAD.replace("import RuleSettings", "import EntityRuleSettings, RuleSettings")
+        + ALARMS.replace("TRIGGER", "beeps.alarm")
     )
     with pytest.raises(
-        DeploymentError, match=r"speaks by beeps\.alarm, which red\.goal does not have: it is a slot of"
+        DeploymentError, match=r"whose trigger is beeps\.alarm, which red\.goal does not have: it is a slot of"
     ):
         load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "seed=5"]), TABLE.name)
 

@@ -94,7 +94,7 @@ class Actuator(Own):
     def hold(self, view):
         view.write(self._rate, 0.0)
 
-    def stir(self, view):
+    def excite(self, view):
         view.write(self._rate, 1.0)
 
     def command(self, view):

@@ -20,9 +20,9 @@ from foosim.vhub.line_of_sight.occlusion import PAIRS_KEPT, Sight
 from foosim.vhub.network.memory import AirState, LinkState, RadioState
 from foosim.vhub.radio.propagation import LOSS_MAX_DB
 from foosim.vhub.radio.shadowing import CELLS_KEPT
-from foosim.world.clearance.solids import Standing
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
+from foosim.world.moving.solids import Standing
 
 KEPT_MAX: Final = 4 * limits.KEPT_TICKS
 BOUNDS: Final[Mapping[str, int]] = {

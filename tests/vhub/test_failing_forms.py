@@ -19,6 +19,7 @@ import sys
 from msgspec import Struct
 from foosim import Player
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import Model, Sensor
 from foosim.world.forms.registry import model, sensor
 from foosim.world.forms.settings import RobotSettings, SensorSettings
 from foosim.world.scene import ORIGIN, Body, Box, Link, Shape
@@ -39,7 +40,7 @@ class Reading(Struct, frozen=True):
 
 
 @sensor("hub_beam", SensorSettings, Reading)
-class Beam:
+class Beam(Sensor):
     def __init__(self, settings, at):
         pass
 
@@ -71,7 +72,7 @@ class Settings(RobotSettings):
 
 
 @model("hub_post", Settings)
-class Post:
+class Post(Model):
     def __init__(self, settings, at):
         self.x, self.name = settings.x, at.robot.name
 

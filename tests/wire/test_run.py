@@ -405,6 +405,7 @@ DOZES: Final = """
 import time
 from msgspec import Struct
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import Sensor
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
 
@@ -414,7 +415,7 @@ class Nothing(Struct, frozen=True):
 
 
 @sensor("dozes", SensorSettings, Nothing)
-class Dozes:
+class Dozes(Sensor):
     def __init__(self, settings, at):
         pass
 

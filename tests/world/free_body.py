@@ -9,7 +9,8 @@ from typing import Final
 
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.base import Model
+from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import Mounting, SensingView, WritableView
 from foosim.world.forms.registry import model
@@ -25,7 +26,7 @@ class FreeRobot(RobotSettings):
 
 
 @model("free_body", FreeRobot, slots=SLOTS)
-class FreeBody:
+class FreeBody(Model):
     """Two links: one that is free, and a hand that is fixed to it."""
 
     def __init__(self, settings: FreeRobot, at: Mounting) -> None:
@@ -65,7 +66,7 @@ class Reader:
         self.layout = build_layout(self.deployment)
         self.entity = self.layout[robot]
         self.numbers = initial_numbers(self.deployment, self.layout)
-        self.sensor: FittedSensor = next(
+        self.sensor: BoundSensor = next(
             one for one in sensors_of(self.deployment, self.layout, self.entity) if one.channel == "own"
         )
 

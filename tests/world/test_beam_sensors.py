@@ -13,7 +13,7 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import SensingView, View
@@ -43,7 +43,7 @@ class Robot:
         about_z = turn((0.0, 0.0, 1.0), heading)
         self.numbers[turned : turned + 4] = multiply(about_z, turn((0.0, 1.0, 0.0), pitch))
 
-    def sensor(self) -> FittedSensor:
+    def sensor(self) -> BoundSensor:
         its = sensors_of(self.deployment, self.layout, self.rover)
         return next(one for one in its if one.channel == "eye")
 
@@ -111,7 +111,7 @@ def test_readings_are_held_between_the_least_and_the_range(fleet_text: Text) -> 
         assert set(near.read()) == {4.0}
         near.set("rover01", (19.7, -1.0, 0.0))
         assert set(near.read()) == {0.5}
-        assert list(near.sensor().sensor.limits().values()) == [(0.5, 4.0)]  # type: ignore[attr-defined]
+        assert list(near.sensor().sensor.limits().values()) == [(0.5, 4.0)]
 
 
 def test_a_cone_sees_what_a_beam_passes(fleet_text: Text) -> None:
@@ -124,7 +124,7 @@ def test_a_cone_sees_what_a_beam_passes(fleet_text: Text) -> None:
     assert cone.read() == pytest.approx([2.0 / cos(radians(15.0)) - 0.05])
     for ray in (True, False):
         one = (cone if ray else beam).sensor().sensor
-        assert type(one).rays([one], cone.numbers).shape == (13 if ray else 1, 6)  # type: ignore[attr-defined]
+        assert type(one).rays([one], cone.numbers).shape == (13 if ray else 1, 6)
 
 
 def test_a_robot_of_any_kind_measures_from_its_own_hull(fleet_text: Text) -> None:
@@ -221,7 +221,7 @@ def test_beyond_its_range_a_ray_has_no_noise(fleet_text: Text) -> None:
     assert len({ways[0] - ways[1] for ways in drawn}) == 50, "each ray has noise of its own"
 
 
-def sample_of(one: FittedSensor, view: SensingView) -> tuple[float, ...]:
+def sample_of(one: BoundSensor, view: SensingView) -> tuple[float, ...]:
     (raw,) = Sensing().sample([one], view)
     assert raw is not None
     return struct.unpack(f"<{len(raw) // 8}d", raw)

@@ -1,4 +1,4 @@
-"""The guide's examples of one's own: each file as it is written there, in an empty folder that is on Python's path."""
+"""The guides' examples of one's own: each file as it is written there, in an empty folder that is on Python's path."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from tests.frames import Frames
 from tests.own_forms import folder_on_path, forget_modules
 
 ROOT: Final = Path(__file__).parents[2]
-GUIDE: Final = ROOT / "docs" / "how-to" / "extending.md"
+GUIDES: Final = [ROOT / "docs" / "how-to" / name for name in ("write_a_sensor.md", "extending.md")]
 PACKAGE: Final = "pyproject.toml"
-BASES: Final = ("omni.py", "omni_motion.py", "omni_drive.py", "yard.py", "rounds.py", "yard.yaml")
+BASES: Final = ("omni.py", "omni_drive.py", "yard.py", "rounds.py", "yard.yaml")
 
 
 class Use(NamedTuple):
@@ -64,7 +64,6 @@ USES: Final[Mapping[str, Use]] = {
         ('robots.rover01.rules={battery: {kind: battery}, service: {kind: "service:Service", interval: 50 cm}}',),
     ),
     "omni.py": Use("yard.yaml", "model omni", files=BASES),
-    "omni_motion.py": Use("yard.yaml", "motion omni_motion:Glide", files=BASES),
     "omni_drive.py": Use("yard.yaml", "actuator omni_drive:OmniDrive", files=BASES),
     "yard.py": Use("yard.yaml", "scene yard:yard", files=BASES),
     "yards.py": Use("yard.yaml", "kit yard", ("scene=null", "yard={side: 8 m}"), BASES, is_package=True),
@@ -76,9 +75,13 @@ FORCED: Final = "engine=pure"
 TICKS: Final = {"deploy/table.yaml": 120, "deploy/warehouse.yaml": 20, "yard.yaml": 100}
 
 
+def guides() -> str:
+    return "".join(page.read_text() for page in GUIDES)
+
+
 def examples() -> dict[str, str]:
     """The files that the guide has, by name."""
-    return dict(re.findall(r"```\w+\n# ([\w.]+)\n(.*?)```", GUIDE.read_text(), re.DOTALL))
+    return dict(re.findall(r"```\w+\n# ([\w.]+)\n(.*?)```", guides(), re.DOTALL))
 
 
 def planted(folder: Path, name: str) -> tuple[str, list[str]]:
@@ -120,11 +123,11 @@ def supervisor(typed: Typed, folder: Path) -> Command:
 
 
 def test_the_guide_says_how_each_is_used() -> None:
-    said = " ".join(GUIDE.read_text().split())
+    said = " ".join(guides().split())
     assert sorted({*USES, *BASES, PACKAGE}) == sorted(examples())
     assert all(setting in said for use in USES.values() for setting in use.sets)
     assert tomllib.loads(examples()[PACKAGE])["tool"]["setuptools"]["py-modules"] == [
-        *("yards", "yard", "omni", "omni_motion", "omni_drive", "rounds")
+        *("yards", "yard", "omni", "omni_drive", "rounds")
     ]
 
 

@@ -16,6 +16,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.simulation.simulation import Simulation
 from foosim.world.actuators.go_to import Place
 from foosim.world.actuators.waypoint import Waypoint
+from foosim.world.components.base import Actuator
 from foosim.world.forms import registry
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.payloads import PayloadCodec
@@ -309,8 +310,8 @@ class Several(Struct, frozen=True):
 @pytest.mark.parametrize(
     ("command", "methods", "text"),
     [
-        (Named, ("progress",), "has fields that are neither numbers nor tuples which may be empty"),
-        (Several, ("progress",), "has fields that are neither numbers nor tuples which may be empty"),
+        (Named, ("progress",), "its fields must be numbers, or tuples which may be empty"),
+        (Several, ("progress",), "its fields must be numbers, or tuples which may be empty"),
         (Bare, ("progress",), "its last field is not `job: JobNumber = 0.0`"),
         (Numbered, (), "has no method progress"),
     ],
@@ -318,7 +319,7 @@ class Several(Struct, frozen=True):
 def test_an_actuator_that_cannot_do_jobs_is_not_registered(
     command: type[Struct], methods: Sequence[str], text: str
 ) -> None:
-    made = type("Made", (), dict.fromkeys(methods, lambda self, view: RUNNING))
+    made = type("Made", (Actuator,), dict.fromkeys(methods, lambda self, view: RUNNING))
     with pytest.raises(Refused, match=text):
         actuator("of_no_jobs", ActuatorSettings, command, jobs=True)(made)
     assert registry.lookup("actuator", "of_no_jobs") is None

@@ -18,7 +18,7 @@ from foosim.node.edited_frame import edit
 from foosim.node.tick import Stepper
 from foosim.simulation.run import rehearse
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.edits import Set
@@ -48,7 +48,7 @@ class Rod:
         self._sensing = Sensing()
 
     @property
-    def sensor(self) -> FittedSensor:
+    def sensor(self) -> BoundSensor:
         return next(one for one in sensors_of(self.deployment, self.layout, self.entity) if one.channel == "encoder")
 
     def read(self, tick: int, slide: float, spin: float = 0.0) -> tuple[float, ...] | None:
@@ -184,6 +184,7 @@ FAILING: Final = '''
 from msgspec import Struct
 
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import Sensor
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
 
@@ -199,7 +200,7 @@ class Reading(Struct, frozen=True):
 
 
 @sensor("failing", Settings, Reading)
-class Failing:
+class Failing(Sensor):
     """Fails."""
 
     def __init__(self, settings, at):

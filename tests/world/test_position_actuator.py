@@ -16,7 +16,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
 from foosim.world.actuators.rod_position import ANGLE_RAD_MAX, Command, PositionActuator
 from foosim.world.assembly.world import body_of, initial_numbers
-from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.components.view import View, WritableView
 from foosim.world.layout import build_layout
 from foosim.world.parameters.table import table_of
@@ -35,7 +35,7 @@ def packed(slide: float, spin: float) -> bytes:
     return struct.pack("<2d", slide, spin)
 
 
-def fitted(rod: str = ROD.name) -> FittedActuator:
+def fitted(rod: str = ROD.name) -> BoundActuator:
     (found,) = actuators_of(DEPLOYMENT, LAYOUT, LAYOUT[rod])
     assert found.channel == "position" and isinstance(found.actuator, PositionActuator)
     return found

@@ -30,75 +30,30 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 NAME: Final = "a name is a lower case letter, then lower case letters, digits, - and _, at most 32 in all"
 ONE: Final = 'Quantity(units.LENGTH, "0 m", "1 m")'
 REFUSED: Final = {
-    'sensor("own", ActuatorSettings, Number)': "its settings are a class derived from SensorSettings, not "
-    "ActuatorSettings",
-    'actuator("own", SensorSettings, Number)': "its settings are a class derived from ActuatorSettings, not "
-    "SensorSettings",
-    'modifier("own", dict)': "its settings are a class derived from ModifierSettings, not dict",
-    'rule("own", EntityRuleSettings)': "its settings are a class derived from RuleSettings, not EntityRuleSettings",
-    'entity_rule("own", 3)': "its settings are a class derived from EntityRuleSettings, not 3",
-    'scene("own", RuleSettings)': "its settings are a class derived from SceneSettings, not RuleSettings",
-    'model("own", SpecBase)': "its settings are a class derived from EntitySettings, not SpecBase",
-    'model("own", RobotSettings, variants=3)': "variants is a mapping of values of dynamics to what differs, not 3",
-    'model("own", RobotSettings, variants={"rigid": 3})': "variants is a mapping of values of dynamics to what "
-    "differs, not a mapping of 1",
-    'model("own", RobotSettings, variants={"rigid": {"is_rigid": True}})': "it has variants, and its settings have no "
-    "dynamics, which chooses one",
+    'sensor("Own", Settings, Number)': f"own_form registers a sensor as 'Own': {NAME}",
+    'sensor("own", ActuatorSettings, Number)': "its settings are a class derived from SensorSettings, not ",
     'kit("own", Own)': "its settings are a class derived from SpecBase, not Own",
     'sensor("own", Settings, dict)': "its reading is a class derived from msgspec.Struct, not dict",
-    'actuator("own", ActuatorSettings, 3)': "its command is a class derived from msgspec.Struct, not 3",
     'sensor("own", Settings, Nothing)': "its reading Nothing has no fields",
-    'sensor("own", Settings, Number, needs="contacts")': "needs is a tuple of names, not 'contacts': a tuple of one is "
-    "('contacts',)",
-    'sensor("own", Settings, Number, needs=(3,))': "needs is a tuple of names, not a list of 1",
-    'sensor("own", Settings, Number, kit=3)': "kit is a name, not 3",
-    'sensor("own", Settings, Number, several="rays")': "several names no setting, 'rays'",
-    'sensor("own", Settings, Number, speaks=("contacts",))': "speaks is a name, not a list of 1",
-    'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, "
-    "foxglove.LocationFix, foxglove.PoseInFrame, not 'foxglove.Pose'",
-    'sensor("own", Settings, Number, shown_as=["x"])': "shown_as is one of foxglove.LaserScan, foxglove.LocationFix, "
-    "foxglove.PoseInFrame, not a list of 1",
-    'sensor("own", Settings, Number, shown_as="foxglove.PoseInFrame")': "its reading Number lacks the numbers that "
-    "foxglove.PoseInFrame shows: x, y, heading or x, y, z, qx, qy, qz, qw",
-    'sensor("own", Settings, Number, shown_as="foxglove.LaserScan")': "its reading Number lacks the tuples of numbers "
-    "that foxglove.LaserScan shows: distances",
-    'sensor("own", Settings, Scan, shown_as="foxglove.LaserScan")': "its settings Settings lack bearings, which "
-    "foxglove.LaserScan shows",
-    'sensor("own", Settings, Number, slots=("kept",))': "slots: they are a mapping of names to counts of numbers, not "
-    "a list of 1",
+    'sensor("own", Settings, Number, needs="contacts")': "needs: Expected `array`, got `str`",
+    'sensor("own", Settings, Number, kit=3)': "kit: Expected `str`, got `int`",
+    'sensor("own", Settings, Number, array_length="rays")': "array_length names no setting, 'rays'",
+    'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, ",
+    'sensor("own", Settings, Number, shown_as="foxglove.PoseInFrame")': "its reading Number lacks the numbers that ",
+    'sensor("own", Settings, Scan, shown_as="foxglove.LaserScan")': "its settings Settings lack bearings, which ",
+    'sensor("own", Settings, Number, slots=("kept",))': "slots: they are a mapping of names to counts of numbers, not ",
     'sensor("own", Settings, Number, slots={"a.b": 1})': f"slots: 'a.b': {NAME}",
-    'sensor("own", Settings, Number, slots={"kept": 0})': "slots: kept has 1 to 65536 numbers, or ENTITY, not 0",
-    'sensor("own", Settings, Number, slots={"kept": 1.0})': "slots: kept has 1 to 65536 numbers, or ENTITY, not 1.0",
     'sensor("own", Settings, Number, slots={"kept": True})': "slots: kept has 1 to 65536 numbers, or ENTITY, not true",
-    'sensor("own", Settings, Number, slots={"a": 65536, "b": 1})': "slots: 65537 numbers in all, at most 65536 are "
-    "valid",
+    'sensor("own", Settings, Number, slots={"a": 65536, "b": 1})': "slots: 65537 numbers in all, at most 65536 are ",
     'modifier("own", ModifierSettings, per_field={"std": 0.0})': "per_field names no setting, 'std' (there are: kind)",
-    'modifier("own", ModifierSettings, per_field={"kind": "0"})': "the least value of the setting kind is a number or "
-    "None, not '0'",
-    'modifier("own", ModifierSettings, per_field=("std",))': "per_field is a mapping of settings to least values, not "
-    "a list of 1",
-    'entity_rule("own", EntityRuleSettings, slots={"a": 1}, settable={"a": 1.0})': "settable: a is set to a Quantity, "
-    "which has limits, not to",
-    f'model("own", RobotSettings, slots={{"a": 2}}, settable={{"a": {ONE}}})': "settable: a is no slot of one "
-    "number, and the class has no method set",
+    'rule("own", RuleSettings, settable={"a": 1.0})': "settable: a is set to a Quantity, which has limits, not to ",
     f'model("own", RobotSettings, slots={{"at": 1}}, settable={{"at": {ONE}}})': "settable: at is set by foosim itself",
-    f'rule("own", RuleSettings, slots={{"a": 2}}, settable={{"a": {ONE}}})': "settable: a is no slot of one "
-    "number, and the class has no method set",
+    f'rule("own", RuleSettings, slots={{"a": 2}}, settable={{"a": {ONE}}})': "settable: a is no slot of one number, ",
     'rule("own", RuleSettings, slots=lambda settings, on: {})': "slots: they are a mapping",
-    'rule("own", RuleSettings, writes="ball")': "writes is a tuple of names, not 'ball': a tuple of one is ('ball',)",
-    'rule("own", RuleSettings, each=("rod",))': "each is a mapping of models to slots, not a list of 1",
-    'rule("own", RuleSettings, each={"rod": 1})': "each rod: they are a mapping of names to counts of numbers, not 1",
-    'entity_rule("own", EntityRuleSettings, needs=["charge"])': "needs is a tuple of names, not a list of 1",
-    'motion("own", writes="position")': "writes is a tuple of names, not 'position'",
+    'rule("own", RuleSettings, each={"rod": {"a": 0}})': "each rod: a has 1 to 65536 numbers, or ENTITY, not 0",
     'model("own", RobotSettings, slots={"down": 2})': "down, which foosim writes, is one number, not 2",
-    'model("own", RobotSettings, tags="vehicle")': "tags is a tuple of names, not 'vehicle'",
-    'model("own", RobotSettings, motion=None)': "motion is a name, not null",
-    'model("own", RobotSettings, actuators={"drive": "wheel_speeds"})': "actuators, drive: settings are a mapping with "
-    "a kind, not 'wheel_speeds'",
-    'kit("own", SpecBase, entities=("ball",))': "entities is a mapping of names to models, not a list of 1",
-    'kit("own", SpecBase, entities={"Big Ball": "ball"})': f"the entity 'Big Ball': {NAME}",
-    'kit("own", SpecBase, spares={"ball-2": "ball"})': "spares is a function of the section, not a mapping of 1",
-    'kit("own", SpecBase, rules={"goal": {}})': "rules, goal: settings are a mapping with a kind, not a mapping of 0",
+    'model("own", RobotSettings, actuators={"drive": "wheel_speeds"})': "actuators: Expected `object`, got `str`",
+    'model("own", RobotSettings, variants={"rigid": {"is_rigid": True}})': "it has variants, and its settings have no ",
 }
 """Registrations, and what is said of each."""
 
@@ -110,11 +65,23 @@ def test_a_registration_that_cannot_be_is_refused_with_name_module_and_place(sit
     line = len(path.read_text().splitlines())
     with pytest.raises(BadValue) as error:
         find(form, "own_form:Own")
-    told = error.value.problem
-    word = {"rule": "rule of worlds", "entity_rule": "rule of entities"}.get(form, form)
-    assert told.startswith(f"cannot be imported: Refused: {word} own of own_form: {REFUSED[registration]}"), told
-    assert told.endswith(f" (own_form.py:{line})")
+    found = error.value.problem
+    word = "rule of worlds" if form == "rule" else form
+    assert found.startswith("cannot be imported: Refused: ") and REFUSED[registration] in found, found
+    assert f"{word} own of own_form: " in found or "own_form registers" in found
+    assert found.endswith(f" (own_form.py:{line})")
     assert registry.lookup(form, "own") is None
+
+
+SETTINGS: Final = {"kit": "SpecBase", "model": "RobotSettings"}
+
+
+@pytest.mark.parametrize("form", ["sensor", "actuator", "modifier", "model", "rule", "kit"])
+def test_a_class_of_another_type_is_refused(site: Path, form: str) -> None:
+    value = ", Number" if form in ("sensor", "actuator") else ""
+    written(site, "class Bare: pass", f"{form}('own', {SETTINGS.get(form, form.title() + 'Settings')}{value})(Bare)")
+    with pytest.raises(BadValue, match=f"the class Bare is not derived from {form.title()} of foosim.components"):
+        find(form, "own_form:Bare")
 
 
 # --- slots that follow from settings ---------------------------------------------------------------------------------
@@ -188,7 +155,7 @@ def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, sa
         ("", ["down", "refused", "clamped"]),
         ("slots={'x': 1}", ["x", "down", "refused", "clamped"]),
         ("slots={'refused': 1, 'x': 2}", ["refused", "x", "down", "clamped"]),
-        ("slots={'x': 1}, motion='differential_drive'", ["x", "down", "refused", "clamped", "quarantined"]),
+        ("slots={'x': 1}, motion=Motion", ["x", "down", "refused", "clamped", "quarantined"]),
         ("slots={'x': 1}, is_rigid=True, is_robot=False", ["x", "quarantined"]),
         ("slots={'x': 1}, is_robot=False", ["x"]),
     ],

@@ -13,26 +13,20 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-from msgspec import Struct
 
 from foosim.analysis.export import export_capture
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
-from foosim.common.errors import BadValue, DeploymentError, Malformed, Refused, UnknownName
+from foosim.common.errors import BadValue, DeploymentError, Refused, UnknownName
 from foosim.deployment.json_schema import deployment_schema
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings
 from foosim.world.forms import registry
-from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import FOLDERS, FORMS, find, find_component, names, own_module, sensor
-from foosim.world.forms.settings import SensorSettings
+from foosim.world.forms.registry import FOLDERS, FORMS, find, find_component, names, own_module
 from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -55,6 +49,7 @@ from pydantic import Field
 from foosim.common.spec_base import LengthNoise
 from foosim.world.forms.settings import SensorSettings
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import Sensor
 from foosim.world.forms.registry import sensor
 
 
@@ -73,7 +68,7 @@ class Reach(Struct, frozen=True):
 
 
 @sensor("reach", ReachSettings, Reach, needs=("joint_positions",))
-class ReachGauge:
+class ReachGauge(Sensor):
     """The slide of a rod, scaled."""
 
     def __init__(self, settings, at):
@@ -91,6 +86,7 @@ from msgspec import Struct
 
 from foosim.world.forms.settings import SensorSettings
 from foosim.world.forms.quantities import Metres
+from foosim.world.components.base import Sensor
 from foosim.world.forms.registry import sensor
 
 
@@ -103,7 +99,7 @@ class Told(Struct, frozen=True):
 
 
 @sensor("teller", SensorSettings, Told, needs=("joint_positions",))
-class Teller:
+class Teller(Sensor):
     """Says where a rod is."""
 
     def __init__(self, settings, at):
@@ -120,6 +116,7 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.components.base import Actuator
 from foosim.world.forms.registry import actuator
 
 
@@ -136,7 +133,7 @@ class Turn(Struct, frozen=True):
 
 
 @actuator("winch", WinchSettings, Turn, slots={"rate": 1, "taken": 1}, needs=("joint_positions",))
-class Winch:
+class Winch(Actuator):
     """A rod's spin by its speed; it counts the commands that it took."""
 
     def __init__(self, settings, at):
@@ -156,7 +153,7 @@ class Winch:
     def hold(self, view):
         view.write(self._rate, 0.0)
 
-    def stir(self, view):
+    def excite(self, view):
         view.write(self._rate, 1.0)
 
     def command(self, view):
@@ -246,25 +243,15 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 # --- foosim's own ----------------------------------------------------------------------------------------------------
 
 
-def test_the_names_of_a_form_are_those_of_foosims_own() -> None:
-    for form in ("sensor", "actuator", "model", "motion"):
-        files = (Path(__file__).parents[2] / "world" / f"{form}s").rglob("[!_]*.py")
-        assert names(form) == sorted(file.stem for file in files)
-    assert names("modifier") == [
-        *("bias_walk", "clip", "delay", "drop_out", "frame_change", "gaussian_noise", "quantise")
-    ]
-    assert names("engine") == ["bullet", "mujoco", "pure"]
-
-
 @pytest.mark.parametrize("form", FORMS)
 def test_each_stands_in_a_module_of_its_name_and_says_what_it_is(form: str) -> None:
     folder = Path(str(import_module(FOLDERS[form]).__file__)).parent
     assert names(form) == sorted(path.stem for path in folder.rglob("*.py") if path.stem != "__init__")
     for name in names(form):
         component = find(form, name)
-        assert (component.form, component.name, component.module) == (form, name, own_module(form, name))
+        assert (component.type_name, component.name, component.module) == (form, name, own_module(form, name))
         assert component.summary.endswith(".")
-        assert find(form, f"{component.module}:{component.made.__qualname__}") is component
+        assert find(form, f"{component.module}:{component.factory.__qualname__}") is component
 
 
 def test_finding_one_imports_its_module_only() -> None:
@@ -303,8 +290,8 @@ def test_an_unknown_name_says_what_there_is_and_the_nearest(form: str, kind: str
 @pytest.mark.usefixtures("site")
 def test_a_class_of_any_module_is_found_by_its_path() -> None:
     gauge = find("sensor", "own_gauges:ReachGauge")
-    assert (gauge.form, gauge.name, gauge.module) == ("sensor", "reach", "own_gauges")
-    assert gauge.made is sys.modules["own_gauges"].ReachGauge and gauge.summary == "The slide of a rod, scaled."
+    assert (gauge.type_name, gauge.name, gauge.module) == ("sensor", "reach", "own_gauges")
+    assert gauge.factory is sys.modules["own_gauges"].ReachGauge and gauge.summary == "The slide of a rod, scaled."
     assert find("sensor", "reach") is gauge, "it has its name from then on"
     winch = find_component("actuator", "own_winch:Winch")
     assert winch.slots == {"rate": 1, "taken": 1} and "own_winch" in sys.modules
@@ -394,17 +381,6 @@ print(json.dumps([told, names("sensor")]))
     assert set(there) >= {"encoder", "pose"}
 
 
-@pytest.mark.parametrize("name", ["", "Gauge", "two words", "a.b", "x" * 33])
-def test_a_name_that_no_deployment_can_write_is_refused(name: str) -> None:
-    with pytest.raises(Refused, match=r"registers a sensor as .*a name is a lower case letter"):
-        sensor(name, SensorSettings, Spoken)(type("Own", (), {}))
-
-
-def test_a_slot_that_each_sensor_has_is_not_declared_again() -> None:
-    with pytest.raises(Refused, match=r"sensor own_counter of .*each sensor has a slot samples already"):
-        sensor("own_counter", SensorSettings, Spoken, slots={"samples": 1})(type("Own", (), {}))
-
-
 @pytest.mark.parametrize("key", ["cls", "self", "_fields_set", "model_config"])
 def test_keys_of_any_name_beside_an_unknown_kind_are_no_more_than_that(key: str) -> None:
     with pytest.raises(DeploymentError, match="unknown sensor"):
@@ -427,33 +403,6 @@ def test_a_package_is_not_imported_for_what_is_foosims_own(site: Path) -> None:
     install(site, "gauges", "own_gauges")
     code = 'print(json.dumps([said("sensor", "encoder"), "own_gauges" in sys.modules]))'
     assert fresh(code, site) == ["foosim.world.sensors.encoder", False]
-
-
-BROKEN: Final = {
-    "own_broken": "own_broken of worn 0.3 cannot be imported: ZeroDivisionError: division by zero (own_broken.py:2)",
-    "own_importer": "own_importer of worn 0.3 cannot be imported: "
-    "ModuleNotFoundError: No module named 'own_missing' (own_importer.py:1)",
-    "own_gone": "own_gone of worn 0.3 cannot be imported: ModuleNotFoundError: No module named 'own_gone'",
-    "own_leaver": "own_leaver of worn 0.3 cannot be imported: SystemExit: 0 (own_leaver.py:2)",
-}
-
-
-@pytest.mark.parametrize("module", BROKEN)
-def test_a_package_that_cannot_be_imported_is_named_and_hurts_nobody_else(site: Path, module: str) -> None:
-    install(site, "gauges", "own_gauges")
-    install(site, "worn", module, version="0.3")
-    try:
-        with pytest.raises(UnknownName) as error:
-            find("sensor", "reech")
-    except SystemExit:
-        pytest.fail("a package that leaves takes the process with it")
-    assert str(error.value) == (
-        f"unknown sensor; {BROKEN[module]} "
-        f"(there are: {', '.join(names('sensor'))}, or any module:Class), 'reech', "
-        "nearest is 'reach'"
-    )
-    assert find("sensor", "reach").module == "own_gauges" and find("sensor", "encoder").name == "encoder"
-    load_deployment(apply_sets(TEXT, TABLE.name, [REACH.replace("own_gauges:ReachGauge", "reach")]), TABLE.name)
 
 
 def test_the_schema_for_editors_has_what_is_installed(site: Path) -> None:
@@ -694,58 +643,3 @@ def test_a_sensor_may_have_the_name_of_an_actuator_that_its_robot_does_not_have(
         sets = ["players={}", f"robots.red.goal.actuators={actuators}", sensor]
         robot = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name).robots["red.goal"]
         assert list(robot.sensors) == ["position"] and "position" not in robot.actuators
-
-
-# --- values that are not all numbers ---------------------------------------------------------------------------------
-
-
-class Spoken(Struct, frozen=True):
-    """Words, and where they were said."""
-
-    text: str
-    slide: Metres
-    marks: tuple[int, ...] = ()
-
-
-SPOKEN: Final = PayloadCodec(Spoken, "speech")
-
-
-@given(st.builds(Spoken, st.text(), st.floats(allow_nan=False), st.lists(st.integers(-9, 2**40)).map(tuple)))
-def test_a_value_in_words_comes_back_as_it_was(value: Spoken) -> None:
-    payload = SPOKEN.encode(value)
-    assert isinstance(payload, bytes)
-    again = SPOKEN.decode(payload)
-    assert (again, type(again)) == (value, Spoken)
-
-
-def test_only_fields_that_are_numbers_count_as_numbers() -> None:
-    assert [field.name for field in SPOKEN.fields] == ["text", "slide", "marks"]
-    assert [field.is_number for field in SPOKEN.fields] == [False, True, False]
-    assert SPOKEN.names == ("slide",) and SPOKEN.unit == "m"
-    assert SPOKEN.numbers(Spoken("a", 1.5)) == []
-
-
-@given(st.binary(max_size=40))
-def test_rubbish_is_malformed(payload: bytes) -> None:
-    try:
-        value = SPOKEN.decode(payload)
-    except Malformed as error:
-        assert str(error).startswith("speech: ")
-    else:
-        assert isinstance(value, Spoken)
-
-
-@pytest.mark.parametrize(
-    "payload",
-    [b"", b"\xc1", b"\x90", b"\x91\xa1a", b"\x93\x01\x02\x90", b"\x93\xa1a\xa1b\x90", b"\x92\xa1\xff\x01", b"\x80"],
-)
-def test_what_is_no_value_in_words_is_malformed(payload: bytes) -> None:
-    with pytest.raises(Malformed, match=r"^speech: "):
-        SPOKEN.decode(payload)
-
-
-def test_what_stands_behind_a_value_in_words_is_malformed() -> None:
-    with pytest.raises(Malformed, match=r"^speech: "):
-        SPOKEN.decode(SPOKEN.encode(Spoken("a", 1.5)) + b"\x00")
-    with pytest.raises(Malformed, match=r"^speech: "):
-        SPOKEN.decode(SPOKEN.encode(Spoken("a", 1.5))[:-1])

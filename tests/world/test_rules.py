@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 from typing import Any, Final
@@ -384,8 +385,8 @@ def test_places_between_lines_are_those_that_no_figure_reaches() -> None:
 
 def told(numbers: list[float], deployment: Deployment = DEPLOYMENT, layout: Layout = LAYOUT) -> dict[str, Any]:
     rule = rules_of(deployment, layout)["football"]
-    status: dict[str, Any] = rule.status(WritableView(0, numbers))  # type: ignore[attr-defined]
-    return {**status, "text": rule.text(status)}  # type: ignore[attr-defined]
+    status: Mapping[str, Any] = rule.status(WritableView(0, numbers))
+    return {**status, "text": rule.text(status)}
 
 
 def test_the_clock_counts_the_ticks_with_a_ball_in_play() -> None:
@@ -480,7 +481,7 @@ def test_marks_tell_own_goals_and_the_end_to_the_tick() -> None:
             shoot(numbers, 1.0)
         rule.apply(WritableView(tick, numbers))
     after = Frame(10, LAYOUT, np.array(numbers))
-    assert list(rule.marks(before, after)) == [  # type: ignore[attr-defined]
+    assert list(rule.marks(before, after)) == [
         (4, "own_goal", "own goal of blue, 1 : 0"),
         (4, "end", "end of the match, 1 : 0"),
     ]

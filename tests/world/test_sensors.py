@@ -16,7 +16,7 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.tick import Stepper
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.fitted import FittedSensor, sensors_of
+from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.frame import Frame
@@ -39,12 +39,12 @@ def deployed(*sets: str) -> Deployment:
     return load_deployment(apply_sets(TEXT, "table.yaml", [AT_ONCE, *sets]), "table.yaml")
 
 
-def fitted(robot: str, channel: str, deployment: Deployment = DEPLOYMENT) -> FittedSensor:
+def fitted(robot: str, channel: str, deployment: Deployment = DEPLOYMENT) -> BoundSensor:
     layout = build_layout(deployment)
     return next(one for one in sensors_of(deployment, layout, layout[robot]) if one.channel == channel)
 
 
-def sampled(one: FittedSensor, numbers: list[float], tick: int) -> bytes:
+def sampled(one: BoundSensor, numbers: list[float], tick: int) -> bytes:
     (payload,) = Sensing().sample([one], SensingView(tick, numbers))
     assert payload is not None
     return payload

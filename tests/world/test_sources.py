@@ -79,12 +79,7 @@ def test_what_is_compiled_counts_with_its_bytes(folder: Path) -> None:
     assert sources_of(made("first_own", "Form")) == {"first_own": code.read_bytes()}
 
 
-@pytest.mark.parametrize("installed", [True, False])
-def test_in_a_library_only_the_same_distribution_counts(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, installed: bool
-) -> None:
-    """There all modules lie beside each other."""
-    monkeypatch.setattr(used_forms, "in_library", lambda file: installed)
-    monkeypatch.setattr(used_forms, "_distribution", lambda top: ("one",) if top in ("first_own", "second_own") else ())
-    wanted = ["first_own", "second_own", *([] if installed else ["third_own"])]
-    assert list(sources_of(made("first_own", "Form"))) == wanted
+def test_in_a_library_only_the_same_package_counts(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There all packages lie beside each other."""
+    monkeypatch.setattr(used_forms, "in_library", lambda file: True)
+    assert list(sources_of(made("first_own", "Form"))) == ["first_own"]

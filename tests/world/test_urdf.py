@@ -102,7 +102,7 @@ def entity_of(body: Body) -> tuple[Entity, list[float]]:
     offsets, size = {}, 0
     for slot, count in slots.items():
         offsets[slot], size = size, size + count
-    model = Model(form="model", name="urdf", made=object, settings=RobotSettings, slots=slots)
+    model = Model(type_name="model", name="urdf", factory=object, settings=RobotSettings, slots=slots)
     return Entity(0, body.name, model, 0, size, size, offsets, slots, slots), [0.0] * size
 
 

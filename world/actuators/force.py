@@ -8,6 +8,7 @@ from msgspec import Meta, Struct
 
 from foosim.common import units
 from foosim.common.units import Quantity
+from foosim.world.components.base import Actuator
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, View, WritableView
@@ -40,7 +41,7 @@ class Push(Struct, frozen=True):
 
 
 @actuator("force", ForceSettings, Push, slots={"set_point": 6}, needs=("angular_velocity",), moves=False)
-class ForceActuator:
+class ForceActuator(Actuator):
     """Pushes with the last force and torque that it was told, throughout each tick."""
 
     def __init__(self, settings: ForceSettings, at: Mounting) -> None:
@@ -63,7 +64,7 @@ class ForceActuator:
         """Push no more."""
         view.write(self._set_point, *[0.0] * 6)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Push a little, for the small run that tells engines apart."""
         view.write(self._set_point, *[0.1 * self._force] * 3, *[0.1 * self._torque] * 3)
 

@@ -7,8 +7,9 @@ from msgspec import Struct
 
 from foosim.common.exact_math import atan2, cos, hypot, sin
 from foosim.common.spec_base import Length, default
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
-from foosim.world.components.view import Misfit, Mounting, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.quantities import JobNumber, Metres
 from foosim.world.forms.registry import actuator
@@ -50,7 +51,7 @@ class Place(Struct, frozen=True):
     needs=("position", "heading"),
     jobs=True,
 )
-class GoTo:
+class GoTo(Actuator):
     """Keeps the last place that it was told; without any the robot stands."""
 
     def __init__(self, settings: GoToSettings, at: Mounting) -> None:
@@ -64,10 +65,12 @@ class GoTo:
 
     @staticmethod
     def check(settings: GoToSettings, at: Mounting) -> None:
-        """Raise Misfit for a robot that neither has wheels nor goes in any direction."""
+        """Raise IncompatibleComponent for a robot that neither has wheels nor goes in any direction."""
         is_base = isinstance(at.spec.robots[at.robot.name], HolonomicRobot)
-        if not is_base and not hasattr(made_model(at.spec, at.layout, at.robot), "wheels"):
-            raise Misfit(("kind",), "it moves robots on two wheels, and those of the model holonomic", settings.kind)
+        if not is_base and made_model(at.spec, at.layout, at.robot).wheels() is None:
+            raise IncompatibleComponent(
+                ("kind",), "it moves robots on two wheels, and those of the model holonomic", settings.kind
+            )
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest of each coordinate (m)."""
@@ -87,7 +90,7 @@ class GoTo:
         """Stop it."""
         self._set(view, 0.0, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Go to a place ahead and aside, for the small run that tells engines apart."""
         x, y, _ = view.read(self._position)
         self._set(view, 1.0, x + 1.0, y + 0.5)

@@ -14,12 +14,13 @@ from msgspec import Struct
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.grasping import Portable, distance_from, grasp_of, portables_of
 from foosim.world.components.mounted import body_at, link_index
-from foosim.world.components.view import Misfit, Mounting, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.forms import registry
-from foosim.world.forms.forms import ENTITY, NO_ENTITY, Engine
+from foosim.world.forms.forms import ENGINES, ENTITY, NO_ENTITY
 from foosim.world.forms.jobs import FAILURE, JobState
 from foosim.world.forms.quantities import JobNumber, Share
 from foosim.world.forms.registry import actuator
@@ -76,7 +77,7 @@ class Grip(Struct, frozen=True):
     moves=False,
     jobs=True,
 )
-class Gripper:
+class Gripper(Actuator):
     """Takes the nearest object in its reach when it is told to close, and lets it go when it is told to open.
 
     A job to close is done when it holds something, and fails where it can take nothing; one to open is done at once.
@@ -110,15 +111,15 @@ class Gripper:
 
     @staticmethod
     def check(settings: GripperSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that is not there, an engine without grasps, a robot that it does not solve."""
-        engines = [registry.find("engine", name) for name in registry.names("engine")]
-        having = [one.name for one in engines if isinstance(one, Engine) and one.grasps]
+        """Raise IncompatibleComponent for a link that is not there, an engine without grasps, a robot that it does not
+        solve."""
+        having = [name for name in registry.engines() if ENGINES[name].grasps]
         if not at.spec.engine_type.grasps:
             what = f"the engine {at.spec.engine} has no grasps: valid is {' or '.join(having)}"
-            raise Misfit(("kind",), what, settings.kind)
+            raise IncompatibleComponent(("kind",), what, settings.kind)
         if not (at.robot.is_rigid and at.robot.kind.couples):
             what = f"{at.robot.name} is no rigid body, so that no load would move it: {VALID}"
-            raise Misfit(("kind",), what, settings.kind)
+            raise IncompatibleComponent(("kind",), what, settings.kind)
         link_index(body_at(at), settings.at.link)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -172,7 +173,7 @@ class Gripper:
     def hold(self, view: WritableView) -> None:
         """Leave all as it is: what is held is held without power, too."""
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Close, for the small run that tells engines apart."""
         self.accept(Grip(1.0), view)
 

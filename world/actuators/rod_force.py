@@ -30,7 +30,7 @@ class RodForce(Struct, frozen=True):
 class ForceActuator(RodSetPoint):
     """Motors that give the force and the torque that they were told last, up to their greatest speeds."""
 
-    stirs: ClassVar = (0.1, 0.1)
+    excites: ClassVar = (0.1, 0.1)
 
     def __init__(self, settings: RodForceSettings, at: Mounting) -> None:
         limits = RodLimits(at)

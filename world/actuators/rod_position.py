@@ -10,6 +10,7 @@ from typing import ClassVar, Final
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import Metres, Radians
 from foosim.world.forms.registry import actuator
@@ -40,7 +41,7 @@ class Command(Struct, frozen=True):
     needs=("joint_positions",),
     kit="table",
 )
-class PositionActuator:
+class PositionActuator(Actuator):
     """A proportional loop from a rod's set-point to the speeds of its motors."""
 
     steady: ClassVar = True
@@ -68,7 +69,7 @@ class PositionActuator:
         """Make the present position the set-point."""
         view.write(self._set_point, *view.read(self._joints))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn, for the small run that tells engines apart."""
         view.write(self._set_point, 0.0, 1.0)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.world.components.entities import Motors
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.forms.quantities import Volts
 from foosim.world.forms.registry import actuator
 from foosim.world.parameters.rod_drives import RodLimits, RodSetPoint, RodVoltageSettings
@@ -39,13 +39,13 @@ class VoltageActuator(RodSetPoint):
 
     @staticmethod
     def check(settings: RodVoltageSettings, at: Mounting) -> None:
-        """Raise Misfit for a motor that turns faster without a load than the table's rods do."""
+        """Raise IncompatibleComponent for a motor that turns faster without a load than the table's rods do."""
         slide, spin = settings.slide, settings.spin
         motors = ("slide", slide.voltage, slide.back_emf, "m/s"), ("spin", spin.voltage, spin.back_emf, "rad/s")
         for (axis, voltage, emf, unit), most in zip(motors, RodLimits(at).speeds, strict=True):
             if voltage / emf > most:
                 what = f"{voltage / emf:g} {unit} without a load, more than table.drive.{axis}.speed, {most:g} {unit}"
-                raise Misfit((axis, "voltage"), what, f"{voltage:g} V")
+                raise IncompatibleComponent((axis, "voltage"), what, f"{voltage:g} V")
 
     def command(self, view: View) -> Motors:
         """Return of slide and spin, in SI units: the speed without a load, the force of the greatest current, and by

@@ -11,6 +11,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import RadiansPerSecond
@@ -32,7 +33,7 @@ class RotorSpeeds(Struct, frozen=True):
 
 
 @actuator("rotor_speeds", RotorSpeedsSettings, RotorSpeeds, slots={"set_point": 4}, needs=("angular_velocity",))
-class RotorSpeedsActuator:
+class RotorSpeedsActuator(Actuator):
     """Rotors that keep the last speeds that they were told."""
 
     def __init__(self, settings: RotorSpeedsSettings, at: Mounting) -> None:
@@ -55,7 +56,7 @@ class RotorSpeedsActuator:
         """Stop the rotors."""
         view.write(self._set_point, 0.0, 0.0, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn the rotors unequally, for the small run that tells engines apart."""
         view.write(self._set_point, *[share * self._speed_max for share in (0.70, 0.71, 0.69, 0.70)])
 

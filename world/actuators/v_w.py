@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from msgspec import Meta, Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
@@ -35,7 +36,7 @@ class Motion(Struct, frozen=True):
 
 
 @actuator("v_w", VWSettings, Motion, slots={"set_point": 2}, needs=("wheel_speeds",))
-class MotionActuator:
+class MotionActuator(Actuator):
     """The two wheels of a robot, as one motion."""
 
     def __init__(self, settings: VWSettings, at: Mounting) -> None:
@@ -58,7 +59,7 @@ class MotionActuator:
         """Stop the wheels."""
         view.write(self._set_point, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Drive in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.5 * self._wheels.speed, 0.3 * self._wheels.turn_rate)
 

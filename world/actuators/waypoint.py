@@ -9,6 +9,7 @@ from msgspec import Struct
 
 from foosim.common.exact_math import PI
 from foosim.common.spec_base import default
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.jobs import JobState
@@ -45,7 +46,7 @@ class Waypoint(Struct, frozen=True):
 @actuator(
     "waypoint", WaypointSettings, Waypoint, slots={"given": 1, "target": 4, **SLOTS}, needs=("arrived",), jobs=True
 )
-class WaypointActuator:
+class WaypointActuator(Actuator):
     """Keeps the last waypoint that it was told; without any the rotorcraft brakes, and hovers where it is."""
 
     def __init__(self, settings: WaypointSettings, at: Mounting) -> None:
@@ -76,7 +77,7 @@ class WaypointActuator:
         x, y, z = view.read(self._position)
         self._set(view, x, y, z, view.read(self._heading)[0])
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Fly askew and up, for the small run that tells engines apart."""
         x, y, z = view.read(self._position)
         self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
@@ -30,7 +31,7 @@ class Drive(Struct, frozen=True):
 
 
 @actuator("wheel_speeds", WheelSpeedsSettings, Drive, slots={"set_point": 2}, needs=("wheel_speeds",))
-class DriveActuator:
+class DriveActuator(Actuator):
     """The two wheels of a robot."""
 
     def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
@@ -51,7 +52,7 @@ class DriveActuator:
         """Stop the wheels."""
         view.write(self._set_point, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Drive in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.3 + 0.01 * (self._set_point.at % 7), 0.4)
 

@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from foosim.common.exact_math import hypot
+from foosim.world.components.base import Actuator
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
@@ -27,7 +28,7 @@ class Velocity(Struct, frozen=True):
 
 
 @actuator("x_y_w", XYWSettings, Velocity, slots={"set_point": 3}, needs=("base_velocity",))
-class VelocityActuator:
+class VelocityActuator(Actuator):
     """The drive of a base, which keeps the last velocity that it was told."""
 
     def __init__(self, settings: XYWSettings, at: Mounting) -> None:
@@ -59,7 +60,7 @@ class VelocityActuator:
         """Stop it."""
         view.write(self._set_point, 0.0, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Go askew in a curve, for the small run that tells engines apart."""
         view.write(self._set_point, 0.5 * self._speed, 0.3 * self._speed, 0.3 * self._turn_rate)
 

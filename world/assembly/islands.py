@@ -82,7 +82,7 @@ def table_reach_of(spec: WorldSpec, layout: Layout) -> Reach:
     alone = tuple(
         Island((entity.index,), entity.name if entity.is_robot else "")
         for entity in layout.entities
-        if entity.kind.motion
+        if entity.kind.motion is not None
     )
     if TABLE not in spec.kits:
         return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)

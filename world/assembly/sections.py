@@ -7,7 +7,7 @@ from typing import Final
 
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_quoted
-from foosim.world.fixed_scenery import kits_of
+from foosim.world.fixed_scenery import kits_of, scene_shapes
 from foosim.world.matter.physics import Physics, physics_from
 from foosim.world.spec import WorldSpec
 
@@ -20,7 +20,7 @@ FELT_BY_NOBODY: Final = ""
 
 def physics_of(spec: WorldSpec) -> Physics:
     """Return what rigid bodies feel: as the kit says that says so, else as the deployment's physics and surfaces do."""
-    found = [physics for _, kit in kits_of(spec) if (physics := kit.physics()) is not None]  # type: ignore[attr-defined]
+    found = [physics for _, kit in kits_of(spec) if (physics := kit.physics()) is not None]
     assert len(found) <= 1, f"{len(found)} kits say what rigid bodies feel"
     return found[0] if found else physics_from(spec.physics, spec.surfaces)
 
@@ -35,7 +35,7 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
 
     Meshes count once their files are there.
     """
-    felt = [name for name, kit in kits_of(spec) if kit.physics() is not None]  # type: ignore[attr-defined]
+    felt = [name for name, kit in kits_of(spec) if kit.physics() is not None]
     for name in felt[1:]:
         yield Finding((name,), f"says what rigid bodies feel, which {felt[0]} says already", name, at="key")
     if felt:
@@ -47,7 +47,7 @@ def findings_of(spec: WorldSpec) -> Iterator[Finding]:
     if not felt and _has_rigid(spec):
         yield from _too_long(spec)
     for _, kit in kits_of(spec):
-        yield from kit.findings()  # type: ignore[attr-defined]
+        yield from kit.findings()
 
 
 def _has_rigid(spec: WorldSpec) -> bool:
@@ -72,9 +72,9 @@ def _unfelt(spec: WorldSpec, *, has_rigid: bool) -> Iterator[Finding]:
     made: list[tuple[Location, str, list[str], Collection[str]]] = []
     scenery = felt.surfaces or felt.sides
     for name, kit in kits_of(spec) if has_rigid else ():
-        made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()], scenery))  # type: ignore[attr-defined]
+        made.append(((name,), f"kit {name}", [shape.surface for shape in kit.shapes()], scenery))
     if spec.scene is not None and has_rigid:
-        surfaces = [shape.surface for shape in spec.scene.component_type.made(spec.scene)]
+        surfaces = [shape.surface for shape in scene_shapes(spec)]
         made.append((("scene", "kind"), f"scene {spec.scene.kind}", surfaces, scenery))
     for name, thing in spec.scenery.items():
         made.append((("scenery", name, "surface"), f"scenery {name}", [thing.surface], scenery))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from foosim.world.components.fitted import FittedActuator
+from foosim.world.components.fitted import BoundActuator
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 
@@ -21,15 +21,14 @@ class Standing:
     rules of their own."""
 
     def __init__(
-        self, layout: Layout, actuators: Mapping[int, Sequence[FittedActuator]], ruled: Collection[int]
+        self, layout: Layout, actuators: Mapping[int, Sequence[BoundActuator]], ruled: Collection[int]
     ) -> None:
         """`actuators` and `ruled` are by the entities' indices."""
         self._having = [(one, one.offsets[UNMOVED]) for one in layout.entities if UNMOVED in one.offsets]
         self._places = {
             entity.index: at
             for entity, at in self._having
-            if entity.index not in ruled
-            and all(getattr(one.actuator, "steady", False) for one in actuators.get(entity.index, ()))
+            if entity.index not in ruled and all(one.actuator.steady for one in actuators.get(entity.index, ()))
         }
 
     def awake(

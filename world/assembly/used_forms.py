@@ -3,16 +3,16 @@
 Two nodes with different versions of a form would compute different worlds, and a capture is only repeated by the form
 that it was made with.
 
-A version depends on a form's module, those of its base classes, and what these import of their own: modules of their
-top-level package, and of its folder where modules lie beside each other; of an installed one those of its distribution.
-Imports are read from the source, so that one within a function counts.
+A version depends on a component's module, those of its base classes, and what these import of their own: modules of
+their top-level package, and of its folder where modules lie beside each other. Imports are read from the source, so
+that one within a function counts.
 """
 
 from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from hashlib import blake2b
@@ -22,34 +22,32 @@ from typing import Any, Final
 
 from foosim.world.forms import registry
 from foosim.world.forms.failures import OURS, in_library
-from foosim.world.forms.forms import Form, Model
+from foosim.world.forms.forms import ComponentType
 from foosim.world.forms.settings import ActuatorSettings, SensorSettings
-from foosim.world.layout import find_motion, spares_of
+from foosim.world.layout import spares_of
 from foosim.world.spec import WorldSpec
 
 DIGEST_BYTES: Final = 8
 
 
-def forms_of(spec: WorldSpec) -> list[Form]:
+def forms_of(spec: WorldSpec) -> list[ComponentType]:
     """Return the forms that a world is made of, each once, by form and name."""
-    found = {(form.form, form.name): form for form in _forms_of(spec)}
+    found = {(form.type_name, form.name): form for form in _forms_of(spec)}
     return [form for _, form in sorted(found.items())]
 
 
-def _forms_of(spec: WorldSpec) -> Iterator[Form]:
-    yield spec.engine_type
+def _forms_of(spec: WorldSpec) -> Iterator[ComponentType]:
     for kit in spec.kit_types.values():
         yield kit
-        for name in (*kit.entities.values(), *spares_of(spec, kit).values()):
-            yield from _with_motion(registry.find_model(name))
+        yield from map(registry.find_model, (*kit.entities.values(), *spares_of(spec, kit).values()))
     for rule in spec.world_rules.values():
         yield rule.component_type
     if spec.scene is not None:
         yield spec.scene.component_type
     for thing in spec.objects.values():
-        yield from _with_motion(thing.component_type)
+        yield thing.component_type
     for robot in spec.robots.values():
-        yield from _with_motion(robot.component_type)
+        yield robot.component_type
         for sensor in robot.sensors.values():
             yield from _with_modifiers(sensor)
         for actuator in robot.actuators.values():
@@ -58,13 +56,7 @@ def _forms_of(spec: WorldSpec) -> Iterator[Form]:
             yield of_entity.component_type
 
 
-def _with_motion(model: Model) -> Iterator[Form]:
-    yield model
-    if model.motion:
-        yield find_motion(model)
-
-
-def _with_modifiers(settings: SensorSettings | ActuatorSettings) -> Iterator[Form]:
+def _with_modifiers(settings: SensorSettings | ActuatorSettings) -> Iterator[ComponentType]:
     yield settings.component_type
     for modifier in settings.modifiers:
         yield modifier.component_type
@@ -73,10 +65,10 @@ def _with_modifiers(settings: SensorSettings | ActuatorSettings) -> Iterator[For
 def foreign_versions(spec: WorldSpec) -> dict[str, str]:
     """Return the versions of the forms of a world that are not foosim's own, by form and class.
 
-    A version is that of the package, if there is one, and a digest of its sources.
+    A version is a digest of the sources.
     """
     foreign = [form for form in forms_of(spec) if not form.is_own]
-    return {f"{form.form} {form.module}:{form.made.__qualname__}": _version(form.made) for form in foreign}
+    return {f"{form.type_name} {form.module}:{form.factory.__qualname__}": _version(form.factory) for form in foreign}
 
 
 @cache
@@ -84,20 +76,7 @@ def _version(made: Callable[..., Any]) -> str:
     digest = blake2b(digest_size=DIGEST_BYTES)
     for module, source in sources_of(made).items():
         digest.update(f"{len(module)} {module} {len(source)} ".encode() + source)
-    version = _package_version(made.__module__.partition(".")[0])
-    return f"{version} {digest.hexdigest()}".lstrip()
-
-
-def _package_version(package: str) -> str:
-    """Return the version of the distribution that a package is of, empty where there is none."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    for distribution in distributions().get(package, ()):
-        try:
-            return version(distribution)
-        except PackageNotFoundError:
-            continue
-    return ""
+    return digest.hexdigest()
 
 
 # --- sources ---------------------------------------------------------------------------------------------------------
@@ -179,13 +158,9 @@ def _names(node: ast.AST, package: str) -> Iterator[str]:
 
 
 def _belongs(other: str, module: str) -> bool:
-    """Whether a module is of the same package, folder or distribution as another."""
-    if _top(other) == _top(module):
-        return True
+    """Whether a module is of the same package as another, or lies in the same folder outside of the libraries."""
     here, there = _folder(_top(module)), _folder(_top(other))
-    if not here or here != there:
-        return False
-    return not in_library(f"{here}/") or _distribution(_top(other)) == _distribution(_top(module))
+    return _top(other) == _top(module) or (bool(here) and here == there and not in_library(f"{here}/"))
 
 
 @cache
@@ -197,15 +172,3 @@ def _folder(top: str) -> str:
     places = [*(spec.submodule_search_locations or ())]
     place = places[0] if places else (spec.origin or "") if spec.has_location else ""
     return place.rpartition("/")[0]
-
-
-def _distribution(top: str) -> tuple[str, ...]:
-    return tuple(sorted(set(distributions().get(top, ()))))
-
-
-@cache
-def distributions() -> Mapping[str, list[str]]:
-    """Return the installed distributions by the top names of their modules; all their files are read, once."""
-    from importlib.metadata import packages_distributions  # brings the parser of e-mail
-
-    return packages_distributions()

@@ -11,24 +11,13 @@ from numpy.typing import NDArray
 
 from foosim.common.keyed_random import draw_key
 from foosim.world.assembly.event_times import events_by_tick
+from foosim.world.components.base import EntityRule, Model, Motion, Rule
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
-from foosim.world.components.entities import (
-    EntityRule,
-    Marked,
-    MarkKind,
-    Model,
-    Motion,
-    MotionMounting,
-    Motors,
-    Rule,
-    RuleMounting,
-    mounting_of,
-)
-from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting, mounting_of
+from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.components.view import (
     ComponentError,
     Mounting,
-    SolvingView,
     View,
     WritableView,
     called,
@@ -36,13 +25,13 @@ from foosim.world.components.view import (
     has_together,
     some_together,
 )
-from foosim.world.components.watching import watched, watched_actuator
+from foosim.world.components.watching import guarded, guarded_actuator
 from foosim.world.edits import parked
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
-from foosim.world.forms.failures import WrongResult, failure_of
-from foosim.world.forms.forms import NO_ENTITY
+from foosim.world.forms.failures import ContractError, failure_of
+from foosim.world.forms.forms import NO_ENTITY, overrides
 from foosim.world.frame import Frame
-from foosim.world.layout import WORLD, Entity, Layout, find_motion
+from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.scene import Body, Scene
 from foosim.world.spec import WorldSpec
 
@@ -59,7 +48,7 @@ TOGETHER_MIN: Final = 32
 """Actuators from which on they are asked together: fewer are asked one after the other in less time."""
 
 
-_Alike: TypeAlias = tuple[str, type[Any]]
+_Alike: TypeAlias = tuple[type[Motion], type[Any]]
 """A motion, and a class of actuators."""
 
 
@@ -68,13 +57,13 @@ class _Moving(NamedTuple):
     at once, or None where each is asked by itself."""
 
     entities: list[Entity]
-    groups: list[tuple[str, list[Entity], Any]]
+    groups: list[tuple[type[Motion], list[Entity], Any]]
 
 
 def model_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Model:
     """Return an entity as its model. Raises ComponentError."""
     settings, at = spec.settings_of(entity.name), mounting_of(spec, layout, entity)
-    model: Model = called(f"model {entity.model}", entity.name, 0, entity.kind.made, settings, at)
+    model: Model = called(f"model {entity.model}", entity.name, 0, entity.kind.factory, settings, at)
     return model
 
 
@@ -96,7 +85,7 @@ def rules_of(spec: WorldSpec, layout: Layout) -> dict[str, Rule]:
     for label, settings in spec.world_rules.items():
         found = settings.component_type
         at = RuleMounting(spec, layout, label, draw_key(spec.seed, "rule", label), frozenset(found.writes))
-        rules[label] = called(f"rule {label}", WORLD, 0, found.made, settings, at)
+        rules[label] = called(f"rule {label}", WORLD, 0, found.factory, settings, at)
     return rules
 
 
@@ -128,15 +117,10 @@ def initial_numbers(
         entity = layout.entities[index]
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for robot in layout.robots:
-        if any(hasattr(its.component_type.made, "place") for its in spec.robots[robot.name].rules.values()):
-            for label, own in entity_rules_of(spec, layout, robot):
-                if hasattr(own, "place"):
-                    placed = watched(own) if is_watched else own
-                    called(f"rule {label}", robot.name, 0, placed.place, view)
+        for label, own in entity_rules_of(spec, layout, robot, "place"):
+            called(f"rule {label}", robot.name, 0, (guarded(own) if is_watched else own).place, view)
     for label, rule in rules_of(spec, layout).items():
-        if hasattr(rule, "place"):
-            placed = watched(rule) if is_watched else rule
-            called(f"rule {label}", WORLD, 0, placed.place, view)
+        called(f"rule {label}", WORLD, 0, (guarded(rule) if is_watched else rule).place, view)
     for name in layout.spares:
         entity = layout[name]
         numbers[entity.start : entity.stop] = parked(layout, entity)
@@ -152,13 +136,12 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
     ]
     shown += [(f"kit {name}", kit, frame) for name, kit in kits_of(spec)]
     for what, one, seen in shown:
-        if hasattr(one, "status"):
-            try:
-                status |= one.status(seen)
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:  # noqa: BLE001  # a run goes on without it
-                status |= {"failed": f"{NO_STATUS} {what}: {failure_of(error)}"}
+        try:
+            status |= one.status(seen)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001  # a run continues without it
+            status |= {"failed": f"{NO_STATUS} {what}: {failure_of(error)}"}
     return status
 
 
@@ -171,26 +154,25 @@ def count_commands(frame: Frame) -> dict[str, int]:
 def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
     """Return in words what rules and kits show, and the commands that were not taken as they came, from what
     `world_status` returned."""
-    made = [settings.component_type.made for settings in spec.world_rules.values()]
-    made += [kit.made for kit in spec.kit_types.values()]
+    made: list[Any] = [settings.component_type.factory for settings in spec.world_rules.values()]
+    made += [kit.factory for kit in spec.kit_types.values()]
     found = [status["failed"]] if "failed" in status else []
     for one in dict.fromkeys(made):
-        if hasattr(one, "text"):
-            try:
-                found.append(one.text(status))
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:  # noqa: BLE001  # without its part of the status, for one
-                found.append(f"{NO_TEXT} {one.__qualname__}: {failure_of(error)}")
+        try:
+            found.append(one.text(status))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # noqa: BLE001  # without its part of the status, for one
+            found.append(f"{NO_TEXT} {one.__qualname__}: {failure_of(error)}")
     found += [f"commands {fate} {count}" for fate, count in status.get("commands", {}).items() if count]
     return [text for text in found if text]
 
 
 def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
     """Return the kinds of what rules mark, by name."""
-    made = [settings.component_type.made for settings in spec.world_rules.values()]
-    made += [rule.component_type.made for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
-    own = {name: kind for one in dict.fromkeys(made) for name, kind in getattr(one, "mark_kinds", {}).items()}
+    made: list[Any] = [settings.component_type.factory for settings in spec.world_rules.values()]
+    made += [rule.component_type.factory for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
+    own = {name: kind for one in dict.fromkeys(made) for name, kind in one.mark_kinds.items()}
     return {FAILED: FAILED_LOOK, **({EVENT: EVENT_LOOK} if spec.events else {}), **own}
 
 
@@ -199,14 +181,12 @@ class WorldMarks:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self._rules: dict[tuple[str, str], Any] = {
-            (WORLD, label): rule for label, rule in rules_of(spec, layout).items() if hasattr(rule, "marks")
+            (WORLD, label): rule for label, rule in rules_of(spec, layout).items() if overrides(type(rule), "marks")
         }
         self._rules |= {
             (robot.name, label): rule
             for robot in layout.robots
-            if any(hasattr(its.component_type.made, "marks") for its in spec.robots[robot.name].rules.values())
-            for label, rule in entity_rules_of(spec, layout, robot)
-            if hasattr(rule, "marks")
+            for label, rule in entity_rules_of(spec, layout, robot, "marks")
         }
         """By entity and name: those of the world first."""
         self._events = events_by_tick(spec)
@@ -233,7 +213,7 @@ def _marks_of(rule: Any, before: Frame, after: Frame) -> list[Marked]:
     found = [*rule.marks(before, after)]
     for mark in found:
         if not (isinstance(mark, tuple) and [*map(type, mark)] == [int, str, str]):
-            raise WrongResult(rule.marks, "a mark (tick, kind, text)", mark)
+            raise ContractError(rule.marks, "a mark (tick, kind, text)", mark)
     return found
 
 
@@ -247,7 +227,7 @@ class World:
         self._rules = rules_of(spec, layout)
         self.has_rules = bool(self._rules)
         fitted = {robot.index: actuators_of(spec, layout, robot) for robot in layout.robots}
-        self.actuators: Mapping[int, tuple[FittedActuator, ...]] = {
+        self.actuators: Mapping[int, tuple[BoundActuator, ...]] = {
             index: actuators for index, actuators in fitted.items() if actuators
         }
         """What moves each robot that has actuators, by the entity's index."""
@@ -255,7 +235,6 @@ class World:
         """The actuators that alone command all motors of their robots, by the entity's index."""
         self._motions = _motions_of(spec, layout)
         self._moving = _Moving([], [])
-        self._motion_of = {entity.index: entity.kind.motion for entity in layout.entities if entity.kind.motion}
         rules = {robot.index: entity_rules_of(spec, layout, robot) for robot in layout.robots}
         self._entity_rules = {index: its for index, its in rules.items() if its}
         self.ruled = frozenset(self._entity_rules)
@@ -268,43 +247,44 @@ class World:
         """The rules that say whether an entity's drives have power, by its index."""
         for index, its in self._entity_rules.items():
             for label, rule in its:
-                if hasattr(rule, "has_power"):
+                if overrides(type(rule), "has_power"):
                     self._powers.setdefault(index, []).append((label, rule))
-        if is_watched:
-            self._watch()
         self._alike: dict[_Alike, list[Any]] = {}
         """The actuators that can be asked together."""
         self._rows: dict[int, tuple[_Alike, int]] = {}
         """Which of them is that of a robot, by the entity's index."""
         self._asking: dict[_Alike, Any] = {}
         """What all of them are together, where some were asked."""
-        for index, one in self._only.items():
-            key = self._motion_of.get(index, ""), type(one.actuator)
-            motion = self._motions.get(key[0])
-            if index not in self._powers and has_together(key[1], "command") and getattr(motion, "takes_arrays", False):
+        for index, one in () if is_watched else self._only.items():
+            motion = layout.entities[index].kind.motion
+            if motion is None or not motion.takes_arrays:
+                continue
+            key = motion, type(one.actuator)
+            if index not in self._powers and has_together(key[1], "command"):
                 members = self._alike.setdefault(key, [])
                 self._rows[index] = key, len(members)
                 members.append(one.actuator)
+        own = {index: type(model) for index, model in self.models.items()}
+        if is_watched:
+            self._watch()
         self._checks: Mapping[int, Callable[[Sequence[float], Sequence[float]], bool]] = {
-            index: check
-            for index, model in self.models.items()
-            if (check := getattr(model, "is_plausible", None)) is not None
+            index: self.models[index].is_plausible for index, kind in own.items() if overrides(kind, "is_plausible")
         }
         self._derive: Mapping[int, Callable[[WritableView], None]] = {
-            entity.index: self.models[entity.index].derive  # type: ignore[attr-defined]
+            entity.index: self.models[entity.index].derive
             for entity in layout.entities
-            if entity.is_rigid and hasattr(self.models[entity.index], "derive")
+            if entity.is_rigid and overrides(own[entity.index], "derive")
         }
 
     def _watch(self) -> None:
         """Give all forms numbers of the frame that they can only read."""
-        self.models = {index: watched(model) for index, model in self.models.items()}
-        self._rules = {label: watched(rule) for label, rule in self._rules.items()}
-        self.actuators = {index: tuple(map(watched_actuator, its)) for index, its in self.actuators.items()}
+        self.models = {index: guarded(model) for index, model in self.models.items()}
+        self._rules = {label: guarded(rule) for label, rule in self._rules.items()}
+        self.actuators = {index: tuple(map(guarded_actuator, its)) for index, its in self.actuators.items()}
         self._only = {index: self.actuators[index][0] for index in self._only}
-        self._motions = {name: watched(motion) for name, motion in self._motions.items()}
+        self._motions = {kind: guarded(motion) for kind, motion in self._motions.items()}
         self._entity_rules = {
-            index: tuple((label, watched(rule)) for label, rule in its) for index, its in self._entity_rules.items()
+            index: tuple((label, guarded(rule)) for label, rule in its) for index, its in self._entity_rules.items()
         }
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
@@ -324,7 +304,7 @@ class World:
         tick: int,
         values: NDArray[np.float64] | None = None,
     ) -> None:
-        """Move those of these entities that go on by motions.
+        """Move those of these entities whose models have motions.
 
         `start` are the numbers at the tick's start, `values` the same as an array where there is one already.
         """
@@ -332,37 +312,31 @@ class World:
             self._moving = self._moving_of(entities)
         if not self._moving.groups:
             return
-        view, asking = SolvingView(tick, start, numbers, values), View(tick, numbers, start=start)
-        for name, moved, together in self._moving.groups:
+        view, asking = WritableView(tick, start, None, numbers, values), View(tick, numbers, start=start)
+        for kind, moved, together in self._moving.groups:
             asked: Any = (
                 self.motors(moved, asking)
                 if together is None
-                else asked_together(f"actuators of the motion {name}", together, len(moved), asking)
+                else asked_together(f"actuators of the motion {kind.__name__}", together, len(moved), asking)
             )
             try:
-                self._motions[name].move(moved, asked, view)
+                self._motions[kind].move(moved, asked, view)
             except BaseException as error:
                 if not isinstance(error, KeyboardInterrupt) and together is None:
                     self.check_motors(moved, asked, tick)
-                raise component_error(f"motion {name}", "", tick, error) from error
+                raise component_error(f"motion {kind.__name__}", "", tick, error) from error
 
     def _moving_of(self, entities: Sequence[Entity]) -> _Moving:
-        groups: dict[str, list[Entity]] = {}
-        for entity in entities:
-            name = self._motion_of.get(entity.index)
-            if name is not None:
-                groups.setdefault(name, []).append(entity)
-        return _Moving(
-            list(entities), [(name, moved, self._together(name, moved)) for name, moved in sorted(groups.items())]
-        )
+        groups = _by_motion(entities)
+        return _Moving(list(entities), [(kind, moved, self._together(kind, moved)) for kind, moved in groups.items()])
 
-    def _together(self, motion: str, entities: Sequence[Entity]) -> Any:
+    def _together(self, motion: type[Motion], entities: Sequence[Entity]) -> Any:
         """Return what asks the motors of all of these entities at once; None where each is asked by itself."""
         found = [self._rows.get(entity.index) for entity in entities]
         rows = [one for one in found if one is not None]
         if len(rows) < max(TOGETHER_MIN, len(found)) or len({key for key, _ in rows}) > 1:
             return None
-        what, (key, _) = f"actuators of the motion {motion}", rows[0]
+        what, (key, _) = f"actuators of the motion {motion.__name__}", rows[0]
         members = self._alike[key]
         if key not in self._asking:
             self._asking[key] = called(what, "", 0, type(members[0]).together, members)
@@ -399,8 +373,8 @@ class World:
                 joints = range(len(asked)) if one.joints is None else one.joints
                 for joint, motor in zip(joints, asked, strict=True):
                     motors[joint] = Motor(*motor)
-                if has_power and hasattr(one.actuator, "wrench"):
-                    wrench = added(wrench, one.actuator.wrench(view))
+                if has_power and (force := one.actuator.wrench(view)) is not None:
+                    wrench = added(wrench, force)
             except BaseException as error:
                 raise one.failed(view.tick, error) from error
         return Drives(tuple(motors), wrench)
@@ -411,7 +385,7 @@ class World:
             try:
                 answer = rule.has_power(view)
                 if answer is not True and answer is not False:
-                    raise WrongResult(rule.has_power, "True or False", answer)
+                    raise ContractError(rule.has_power, "True or False", answer)
             except BaseException as error:
                 raise component_error(f"rule {label}", entity.name, view.tick, error) from error
             if not answer:
@@ -441,7 +415,7 @@ class World:
             count = entity.counts.get("joint_positions") if entity.is_rigid else None
             what = "a tuple of (target, greatest force)" + ("" if count is None else f" for {count} motors")
             if not are_motors(motors, count):
-                error = WrongResult(actuators[0].actuator.command, what, motors)
+                error = ContractError(actuators[0].actuator.command, what, motors)
                 raise actuators[0].failed(tick, error) from error
 
     def _motors_of_several(self, entity: Entity, view: View) -> Motors:
@@ -508,35 +482,40 @@ class World:
         try:
             is_plausible = check(numbers, before)
             if is_plausible is not True and is_plausible is not False:
-                raise WrongResult(check, "True or False", is_plausible)
+                raise ContractError(check, "True or False", is_plausible)
         except BaseException as error:
             raise component_error(f"model {entity.model}", entity.name, tick, error) from error
         return "" if is_plausible else "its new state is not within its bounds, speed limits and reach"
 
-    def stir(self, numbers: list[float]) -> None:
+    def excite(self, numbers: list[float]) -> None:
         """Set a world at rest in motion, for the fixed small run that tells engines apart. Raises ComponentError."""
         view = WritableView(0, numbers)
         for index, model in self.models.items():
             entity = self._layout.entities[index]
-            if hasattr(model, "stir") and not entity.is_absent(numbers):
-                called(f"model {entity.model}", entity.name, 0, model.stir, view)
+            if not entity.is_absent(numbers):
+                called(f"model {entity.model}", entity.name, 0, model.excite, view)
         for index, fitted in self.actuators.items():
             if self._layout.entities[index].is_absent(numbers):
                 continue
             for one in fitted:
-                called(f"actuator {one.channel}", one.robot, 0, one.actuator.stir, view)
+                called(f"actuator {one.channel}", one.robot, 0, one.actuator.excite, view)
 
 
-def _motions_of(spec: WorldSpec, layout: Layout) -> dict[str, Motion]:
-    moving: dict[str, list[Entity]] = {}
-    for entity in layout.entities:
-        if entity.kind.motion:
-            moving.setdefault(entity.kind.motion, []).append(entity)
-    motions: dict[str, Motion] = {}
-    for name, entities in sorted(moving.items()):
-        found = find_motion(entities[0].kind)
-        at = MotionMounting(spec, layout, name, tuple(entities), frozenset(found.writes))
-        motions[name] = called(f"motion {name}", "", 0, found.made, at)
+def _by_motion(entities: Iterable[Entity]) -> dict[type[Motion], list[Entity]]:
+    """Return those of these entities that motions move, by motion, in the order of their names."""
+    groups: dict[type[Motion], list[Entity]] = {}
+    for entity in entities:
+        if entity.kind.motion is not None:
+            groups.setdefault(entity.kind.motion, []).append(entity)
+    return dict(sorted(groups.items(), key=lambda item: item[0].__qualname__))
+
+
+def _motions_of(spec: WorldSpec, layout: Layout) -> dict[type[Motion], Motion]:
+    motions: dict[type[Motion], Motion] = {}
+    for kind, entities in _by_motion(layout.entities).items():
+        made: Any = kind
+        at = MotionMounting(spec, layout, kind, tuple(entities))
+        motions[kind] = called(f"motion {kind.__name__}", "", 0, made, at)
     return motions
 
 
@@ -549,16 +528,15 @@ def asked_together(what: str, together: Any, count: int, view: View) -> NDArray[
         asked = together.command(view)
         if isinstance(asked, np.ndarray) and asked.dtype == np.float64 and asked.shape[0::2] == (count, 2):
             return asked
-        raise WrongResult(together.command, f"an array of float64 of the shape ({count}, motors, 2)", asked)
+        raise ContractError(together.command, f"an array of float64 of the shape ({count}, motors, 2)", asked)
     except BaseException as error:
         raise component_error(what, "", view.tick, error) from error
 
 
-def _without_power(one: FittedActuator, view: View) -> Motors:
+def _without_power(one: BoundActuator, view: View) -> Motors:
     """Return what an actuator asks of its motors where there is no power: to stand still, with all their force."""
-    unpowered = getattr(one.actuator, "unpowered", None)
-    asked: Motors = tuple((0.0, motor[1]) for motor in one.actuator.command(view)) if unpowered is None else unpowered()
-    return asked
+    asked = one.actuator.unpowered()
+    return tuple((0.0, motor[1]) for motor in one.actuator.command(view)) if asked is None else asked
 
 
 def are_motors(asked: object, count: int | None) -> bool:
@@ -573,12 +551,16 @@ def are_motors(asked: object, count: int | None) -> bool:
     )
 
 
-def entity_rules_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[tuple[str, EntityRule], ...]:
-    """Return the rules of a robot by name, in name order. Raises ComponentError."""
+def entity_rules_of(
+    spec: WorldSpec, layout: Layout, robot: Entity, hook: str = ""
+) -> tuple[tuple[str, EntityRule], ...]:
+    """Return the rules of a robot by name, in name order: all, or those that override a hook. Raises ComponentError."""
     rules = []
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
-        found = settings.component_type
+        found: Any = settings.component_type
+        if hook and not overrides(found.factory, hook):
+            continue
         key = draw_key(spec.seed, "entity_rule", robot.name, label)
         at = Mounting(spec, layout, robot, label, key, frozenset(found.written))
-        rules.append((label, called(f"rule {label}", robot.name, 0, found.made, settings, at)))
+        rules.append((label, called(f"rule {label}", robot.name, 0, found.factory, settings, at)))
     return tuple(rules)

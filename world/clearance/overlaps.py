@@ -21,11 +21,11 @@ from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import is_felt
 from foosim.world.assembly.world import initial_numbers, models_of
 from foosim.world.clearance.convex import Convex, convex_parts, overlap_of
-from foosim.world.clearance.solids import scenery_of
 from foosim.world.clearance.start import PLACED_BY
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.matter.mesh import Mesh
+from foosim.world.moving.solids import scenery_of
 from foosim.world.rays.sorted_boxes import SortedBoxes
 from foosim.world.scene import MOVING, Body, Quaternion, Shape, Vector, place, shape_box
 from foosim.world.spec import WorldSpec

@@ -71,7 +71,7 @@ class BeamsTogether(Rows):
 
 def body_of(at: Mounting) -> Body:
     """Return the body of the robot that a component is on. Raises BadValue for one that has none."""
-    made = at.robot.kind.made(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
+    made = at.robot.kind.factory(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
     body: Body | None = made.body()
     if body is None:
         raise BadValue("it sends rays from a robot without a body", at.robot.name)

@@ -9,7 +9,9 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import msgspec
 
-from foosim.world.forms.failures import WrongResult
+from foosim.world.components.base import Actuator
+from foosim.world.forms.failures import ContractError
+from foosim.world.forms.forms import overrides
 from foosim.world.forms.payloads import Field, PayloadCodec, field_at
 
 Bound: TypeAlias = tuple[float, float]
@@ -29,13 +31,13 @@ NONE_CLAMPED: Final[Sequence[Clamped]] = ()
 
 
 def limits_of(made: Any, fields: Sequence[Field]) -> Mapping[str, Bound]:
-    """Return the least and the greatest value of fields of a component's values. Raises WrongResult."""
-    if not hasattr(made, "limits"):
-        return NO_LIMITS
+    """Return the least and the greatest value of fields of a component's values. Raises ContractError."""
     limits = made.limits()
     names = [field.name for field in fields]
     if not (isinstance(limits, Mapping) and {*limits} <= {*names} and all(map(_is_bound, limits.values()))):
-        raise WrongResult(made.limits, f"a mapping of fields ({', '.join(names)}) to least and greatest value", limits)
+        raise ContractError(
+            made.limits, f"a mapping of fields ({', '.join(names)}) to least and greatest value", limits
+        )
     return limits
 
 
@@ -45,8 +47,9 @@ def _is_bound(value: object) -> bool:
 
 def bounds_of(made: Any, fields: Sequence[Field], size: int) -> list[Bound]:
     """Return the least and the greatest of each of `size` numbers: `bounds()` of a component, else its `limits()`."""
-    if hasattr(made, "bounds"):
-        return list(made.bounds())
+    bounds = made.bounds() if isinstance(made, Actuator) else None
+    if bounds is not None:
+        return list(bounds)
     limits = limits_of(made, fields)
     return [limits.get(field_at(fields, size, place).name, (-inf, inf)) for place in range(size)]
 
@@ -55,9 +58,9 @@ class CommandBounds:
     """The limits of one actuator. What it keeps follows from the actuator."""
 
     def __init__(self, made: Any, codec: PayloadCodec) -> None:
-        """Raises WrongResult for limits that are none."""
+        """Raises ContractError for limits that are none."""
         self._made, self._codec, self._limits = made, codec, limits_of(made, codec.fields)
-        self._within: Callable[[Any], Any] | None = getattr(made, "within", None)
+        self._within: Callable[[Any], Any] | None = made.within if overrides(type(made), "within") else None
         self._size = -1
         self._ends: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
         """How many numbers the last command had, with their least and greatest values."""
@@ -101,8 +104,8 @@ class CommandBounds:
 
     def _names(self, size: int) -> Sequence[str]:
         """Return what each number of a command is called."""
-        if hasattr(self._made, "names"):
-            return tuple(self._made.names())
+        if names := self._made.names():
+            return tuple(names)
         found = [field_at(self._codec.fields, size, place) for place in range(size)]
         first = {field.name: place for place, field in reversed([*enumerate(found)])}
         return [

@@ -13,7 +13,7 @@ import numpy as np
 
 from foosim.common.names import CHANNEL_ECHO
 from foosim.world.components.bounds import Clamped
-from foosim.world.components.fitted import FittedActuator, actuators_of
+from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
@@ -37,7 +37,7 @@ class CommandWatch:
         self._spec, self._say = spec, warn
         self._layout: Layout | None = None
         self._places = np.zeros((0, 2), dtype=np.int64)
-        self._actuators: dict[str, tuple[FittedActuator, ...]] = {}
+        self._actuators: dict[str, tuple[BoundActuator, ...]] = {}
         """Of robots whose counters have changed."""
         self._due: dict[int, int] = {}
         """Of robots, by their place, the tick from which commands are looked at again."""
@@ -105,7 +105,7 @@ class CommandWatch:
             for number in clamped:
                 yield one.channel, "clamped", number.name, f"{number_text(number)}, sent by {packet.source}"
 
-    def _actuators_of(self, robot: str) -> tuple[FittedActuator, ...]:
+    def _actuators_of(self, robot: str) -> tuple[BoundActuator, ...]:
         if robot not in self._actuators:
             assert self._layout is not None
             self._actuators[robot] = actuators_of(self._spec, self._layout, self._layout[robot])

@@ -9,40 +9,36 @@ from typing import Any, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
+from foosim.world.components.base import Actuator, Modifier, Sensor
 from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
 from foosim.world.components.job_book import JobBook
 from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import (
-    Actuator,
     ComponentError,
-    Modifier,
     ModifierMounting,
     Mounting,
-    Sensor,
     WritableView,
     called,
     component_error,
 )
-from foosim.world.forms.failures import WrongResult
-from foosim.world.forms.forms import SAMPLES, Component
+from foosim.world.forms.failures import ContractError
+from foosim.world.forms.forms import SAMPLES, Component, overrides
 from foosim.world.forms.payloads import FLOAT, PayloadCodec, as_floats
 from foosim.world.forms.per_field import codec_of, numbers_of
 from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
-from foosim.world.layout import Entity, Layout, modifier_labels, slot_that_speaks
+from foosim.world.layout import Entity, Layout, modifier_labels, trigger_slot
 from foosim.world.spec import WorldSpec
 
 
 @dataclass(frozen=True, slots=True)
-class FittedModifier:
+class BoundModifier:
     """A modifier of one sensor or actuator: its name, and which robot's it is, for messages."""
 
     what: str
     robot: str
     modifier: Modifier
-    apply_command: Callable[[list[float], WritableView], list[float] | None]
-    """What takes a command: `accept` where there is one, else `apply`."""
-    due: Callable[[WritableView], list[float] | None] | None
-    """What returns a command that had to wait; None of a modifier that lets none wait."""
+    waits: bool
+    """Whether commands may have to wait in it."""
 
     def apply(self, values: list[float], view: WritableView) -> list[float] | None:
         """Return what becomes of the numbers of a reading. Raises ComponentError."""
@@ -50,11 +46,11 @@ class FittedModifier:
 
     def accept(self, values: list[float], view: WritableView) -> list[float] | None:
         """Return what becomes of the numbers of a command; None where it is dropped or waits. Raises ComponentError."""
-        return self._checked(len(values), view, self.apply_command, values, view)
+        return self._checked(len(values), view, self.modifier.accept, values, view)
 
     def take_due(self, size: int, view: WritableView) -> list[float] | None:
         """Return the numbers of a command whose time has come, of so many. Raises ComponentError."""
-        return None if self.due is None else self._checked(size, view, self.due, view)
+        return self._checked(size, view, self.modifier.due, view) if self.waits else None
 
     def _checked(
         self, size: int, view: WritableView, call: Callable[..., list[float] | None], *arguments: Any
@@ -67,7 +63,7 @@ class FittedModifier:
                 floats = values if FLOAT.issuperset(map(type, values)) else as_floats(values)
                 if floats is not None:
                     return floats
-            raise WrongResult(call, f"a list of {size} numbers, or None,", values)
+            raise ContractError(call, f"a list of {size} numbers, or None", values)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
 
@@ -77,7 +73,7 @@ class FittedModifier:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FittedSensor:
+class BoundSensor:
     """A sensor of one robot: the channel of its readings, its schedule (`spec.Schedule`) number by number,
     which is read at each tick, and the slot that counts them."""
 
@@ -89,16 +85,16 @@ class FittedSensor:
     samples_at: int
     sensor: Sensor
     codec: PayloadCodec
-    modifiers: tuple[FittedModifier, ...]
+    modifiers: tuple[BoundModifier, ...]
     size: int
     """How many numbers a reading has; 0 of one that is not all numbers."""
-    speaks_at: int = -1
+    trigger_at: int = -1
     """The place of the number that makes it measure where it is not 0; -1 without one."""
 
     def is_due(self, tick: int, numbers: Sequence[float]) -> bool:
         """Whether it measures at a tick, at whose start the numbers of the frame are these."""
         return (tick * self.step + self.shift) % self.period < self.step or (
-            self.speaks_at >= 0 and numbers[self.speaks_at] != 0.0
+            self.trigger_at >= 0 and numbers[self.trigger_at] != 0.0
         )
 
     def sample(self, view: WritableView) -> Any:
@@ -108,7 +104,7 @@ class FittedSensor:
         except BaseException as error:
             raise self.failed(view.tick, error) from error
         if not isinstance(reading, self.codec.kind):
-            wrong = WrongResult(self.sensor.sample, f"a {self.codec.kind.__name__}", reading)
+            wrong = ContractError(self.sensor.sample, f"a {self.codec.kind.__name__}", reading)
             raise self.failed(view.tick, wrong) from wrong
         return reading
 
@@ -118,14 +114,14 @@ class FittedSensor:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FittedActuator:
+class BoundActuator:
     """An actuator of one robot, and the channel of its commands."""
 
     robot: str
     channel: str
     actuator: Actuator
     codec: PayloadCodec
-    modifiers: tuple[FittedModifier, ...]
+    modifiers: tuple[BoundModifier, ...]
     size: int
     """How many numbers a command has; 0 of one that is not all numbers."""
     bounds: CommandBounds
@@ -141,7 +137,7 @@ class FittedActuator:
     @property
     def has_waiting(self) -> bool:
         """Whether commands may have to wait for their tick."""
-        return any(one.due is not None for one in self.modifiers)
+        return any(one.waits for one in self.modifiers)
 
     def accept(self, payload: bytes, view: WritableView, source: str = "") -> bool:
         """Take a command of an endpoint, clamped to its limits; False when it is refused. Raises ComponentError."""
@@ -172,12 +168,12 @@ class FittedActuator:
 
         Modifiers may change it before. Raises ComponentError.
         """
-        problem, why = getattr(self.actuator, "problem", None), ""
+        why = ""
         try:
             command = self.codec.decode_finite(payload)
             found = self.bounds.clamp(command)
-            if problem is not None and (self.jobs is None or command.job >= 0.0):
-                why = problem(command)
+            if self.jobs is None or command.job >= 0.0:
+                why = self.actuator.problem(command)
         except Malformed as error:
             return str(error), ()
         except BaseException as error:
@@ -214,7 +210,7 @@ class FittedActuator:
                 if is_taken and clamped:
                     view.written_to[self.clamped_at] += 1.0
                 return is_taken
-            raise WrongResult(self.actuator.accept, "True or False", is_taken)
+            raise ContractError(self.actuator.accept, "True or False", is_taken)
         except BaseException as error:
             raise self.failed(view.tick, error) from error
 
@@ -234,7 +230,7 @@ class FittedActuator:
 # --- making ----------------------------------------------------------------------------------------------------------
 
 
-def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSensor, ...]:
+def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[BoundSensor, ...]:
     """Return the sensors of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].sensors.items()):
@@ -244,9 +240,9 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
         sensor = _made(component, settings, mounting)
         of_values = _spacing(spec, component, settings)
         modifiers = tuple(_modifiers(component, settings, mounting, sensor, of_values))
-        numbers, speaks = numbers_of(component, settings, robot.counts), component.speaks_by(settings)
+        numbers, trigger = numbers_of(component, settings, robot.counts), component.trigger_by(settings)
         fitted.append(
-            FittedSensor(
+            BoundSensor(
                 robot.name,
                 channel,
                 *spec.schedule(settings),
@@ -255,13 +251,13 @@ def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedSe
                 codec_of(component),
                 modifiers,
                 0 if numbers is None else numbers.size,
-                robot.offsets[slot_that_speaks(robot, channel, speaks)] if speaks else -1,
+                robot.offsets[trigger_slot(robot, channel, trigger)] if trigger else -1,
             )
         )
     return tuple(fitted)
 
 
-def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[FittedActuator, ...]:
+def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[BoundActuator, ...]:
     """Return the actuators of a robot, in the order of their channels. Raises ComponentError."""
     fitted = []
     for channel, settings in sorted(spec.robots[robot.name].actuators.items()):
@@ -276,7 +272,7 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
         counter = robot.offsets["clamped"]
         joints = called(f"actuator {channel}", robot.name, 0, _joints, component, settings, mounting)
         fitted.append(
-            FittedActuator(
+            BoundActuator(
                 robot.name,
                 channel,
                 made,
@@ -294,14 +290,14 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[Fitted
 
 
 def _joints(component: Component, settings: ActuatorSettings, mounting: Mounting) -> tuple[int, ...] | None:
-    """Return the joints that the settings of an actuator name; None where they name none. Raises Misfit."""
+    """Return the joints that an actuator's settings name; None where they name none. Raises IncompatibleComponent."""
     named = component.joints_named(settings)
     return None if named is None else joint_indices(mounting, named, component.joints)
 
 
 def _made(component: Component, settings: ComponentSettings, mounting: Mounting | ModifierMounting) -> Any:
     at = mounting if isinstance(mounting, Mounting) else mounting.mounting
-    return called(f"{component.form} {at.name}", at.robot.name, 0, component.made, settings, mounting)
+    return called(f"{component.type_name} {at.name}", at.robot.name, 0, component.factory, settings, mounting)
 
 
 class Spacing(NamedTuple):
@@ -312,8 +308,8 @@ class Spacing(NamedTuple):
 
 
 def _spacing(spec: WorldSpec, sensor: Component, settings: SensorSettings) -> Spacing:
-    """Return that of a sensor's readings; one that speaks may have one at each tick."""
-    if sensor.speaks:
+    """Return that of a sensor's readings; one with a trigger may have one at each tick."""
+    if sensor.trigger:
         return Spacing(1, spec.tick_ns / 1e9)
     return Spacing(spec.schedule(settings).least_ticks, float(1 / settings.rate_hz))
 
@@ -324,7 +320,7 @@ def _modifiers(
     mounting: Mounting,
     made: Any,
     of_values: Spacing,
-) -> Iterator[FittedModifier]:
+) -> Iterator[BoundModifier]:
     """Yield the modifiers of a component's readings or commands, in order; their draws are keyed by their names."""
     if not settings.modifiers:
         return
@@ -332,14 +328,14 @@ def _modifiers(
     assert numbers is not None, "checked with the deployment"
     spec, robot, channel = mounting.spec, mounting.robot, mounting.name
     limits = NO_LIMITS
-    if component.form == "sensor":
+    if component.type_name == "sensor":
         limits = called(f"sensor {channel}", robot.name, 0, limits_of, made, numbers.fields)
     bounds = [limits.get(numbers.field(place).name, (-inf, inf)) for place in range(numbers.size)]
     low, high = tuple(least for least, _ in bounds), tuple(most for _, most in bounds)
     for label, its in zip(modifier_labels(settings.modifiers), settings.modifiers, strict=True):
-        key = draw_key(spec.seed, component.form, robot.name, channel, label)
+        key = draw_key(spec.seed, component.type_name, robot.name, channel, label)
         own = Mounting(spec, mounting.layout, robot, f"{channel}.{label}", key, is_owners=mounting.is_owners)
         at = ModifierMounting(own, numbers, low, high, spec.tick_ns, of_values.period_s, of_values.least_ticks, key)
         one = _made(its.component_type, its, at)
-        accept, due = getattr(one, "accept", one.apply), getattr(one, "due", None)
-        yield FittedModifier(f"modifier {label} of {channel}", robot.name, one, accept, due)
+        waits = overrides(type(one), "due")
+        yield BoundModifier(f"modifier {label} of {channel}", robot.name, one, waits)

@@ -42,7 +42,7 @@ def _portables_of(spec: WorldSpec, layout: Layout) -> tuple[Portable, ...]:
         if entity.is_robot or not entity.kind.couples:
             continue
         settings = spec.settings_of(entity.name)
-        body: Body | None = entity.kind.made(settings, mounting_of(spec, layout, entity)).body()
+        body: Body | None = entity.kind.factory(settings, mounting_of(spec, layout, entity)).body()
         if body is None:
             continue
         low, high = swept_box(body)

@@ -8,8 +8,9 @@ from typing import Any, Final
 
 import msgspec
 
-from foosim.world.components.view import Actuator, Mounting, View, WritableView
-from foosim.world.forms.failures import WrongResult
+from foosim.world.components.base import Actuator
+from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.forms.failures import ContractError
 from foosim.world.forms.jobs import CHANGED, JOB, NUMBER_MAX, NUMBERS, RUNNING, STATES, JobState
 
 NOBODY: Final = 0.0
@@ -90,7 +91,7 @@ class JobBook:
         if numbers[self._running.at] != NOBODY:
             state = made.progress(view) if has_power else JobState.FAILED
             if state not in (JobState.RUNNING, JobState.DONE, JobState.FAILED):
-                raise WrongResult(made.progress, "JobState.RUNNING, DONE or FAILED", state)
+                raise ContractError(made.progress, "JobState.RUNNING, DONE or FAILED", state)
             if state != JobState.RUNNING:
                 self._end(view, state)
             if state == JobState.FAILED:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from foosim.common.names import nearest_quoted
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.rows import Rows
-from foosim.world.components.view import Misfit, Mounting
+from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.kinematics import Twist, forward_kinematics, twist
 from foosim.world.placing import MountedAt
 from foosim.world.rays.boxes import Floats
@@ -25,16 +25,16 @@ OF_TWIST = ("linear_velocity", "angular_velocity")
 
 
 def joint_indices(at: Mounting, named: Sequence[str], setting: str = "joints") -> tuple[int, ...]:
-    """Return the numbers of the joints of a robot that a setting of a component names. Raises Misfit for one that the
-    robot does not have, or that is named twice."""
+    """Return the numbers of the joints of a robot that a setting of a component names. Raises IncompatibleComponent for
+    one that the robot does not have, or that is named twice."""
     body = body_at(at)
     names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
     for place, name in enumerate(named):
         if name not in names:
             what = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
-            raise Misfit((setting, place), what, name, nearest_quoted(name, names))
+            raise IncompatibleComponent((setting, place), what, name, nearest_quoted(name, names))
         if name in named[:place]:
-            raise Misfit((setting, place), "named twice", name)
+            raise IncompatibleComponent((setting, place), "named twice", name)
     return tuple([names.index(name) for name in named])
 
 
@@ -42,7 +42,7 @@ class Mounted:
     """A place on a robot. What it keeps follows from deployment and layout."""
 
     def __init__(self, at: Mounting, where: MountedAt) -> None:
-        """Raises Misfit for a robot without a body, or a link that the robot does not have."""
+        """Raises IncompatibleComponent for a robot without a body, or a link that the robot does not have."""
         self.entity = at.robot
         self._body = body_at(at)
         self.link = link_index(self._body, where.link)
@@ -68,11 +68,11 @@ class Mounted:
         return twist(self._body, self.entity, numbers, self.link, place)
 
     def check_twist(self) -> None:
-        """Raise Misfit where the robot's state does not say how fast its places move and turn."""
+        """Raise IncompatibleComponent where the robot's state does not say how fast its places move and turn."""
         missing = [field for field in OF_TWIST if field not in self.entity.offsets]
         if self._body.is_free and missing:
             what = f"{self.entity.name} moves freely, and its state has no {', '.join(missing)}"
-            raise Misfit(("kind",), what, self.entity.model)
+            raise IncompatibleComponent(("kind",), what, self.entity.model)
 
 
 class MountedTogether(Rows):
@@ -107,21 +107,21 @@ def free_poses(state: Floats, back: Floats, centres: Floats) -> tuple[Floats, Fl
 
 
 def body_at(at: Mounting) -> Body:
-    """Return the body of the robot that a component is on. Raises Misfit for one without."""
-    model = at.robot.kind.made(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
+    """Return the body of the robot that a component is on. Raises IncompatibleComponent for one without."""
+    model = at.robot.kind.factory(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
     body: Body | None = model.body()
     if body is None:
-        raise Misfit(("kind",), f"{at.robot.name} has no body to carry it", at.robot.model)
+        raise IncompatibleComponent(("kind",), f"{at.robot.name} has no body to carry it", at.robot.model)
     return body
 
 
 def link_index(body: Body, name: str | None) -> int:
-    """Return the index of a body's link: its name is with or without that of the body. Raises Misfit."""
+    """Return the index of a body's link: its name is with or without that of the body. Raises IncompatibleComponent."""
     if name is None:
         return 0
     names = [link.name.removeprefix(f"{body.name}/") for link in body.links]
     name = name.removeprefix(f"{body.name}/")
     if name not in names:
         what = f"{body.name} has no such link; there are {', '.join(names)}"
-        raise Misfit(("at", "link"), what, name, nearest_quoted(name, names))
+        raise IncompatibleComponent(("at", "link"), what, name, nearest_quoted(name, names))
     return names.index(name)

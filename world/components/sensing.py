@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue, NotFinite
-from foosim.world.components.fitted import FittedSensor
+from foosim.world.components.fitted import BoundSensor
 from foosim.world.components.view import SensingView, called, component_error, has_together, some_together
-from foosim.world.forms.failures import WrongResult
+from foosim.world.forms.failures import ContractError
 from foosim.world.forms.payloads import as_floats
 
 Numbers: TypeAlias = NDArray[np.float64]
@@ -34,15 +34,15 @@ class Sensing:
     """Samples the sensors of one layout."""
 
     def __init__(self) -> None:
-        self._plans: dict[tuple[FittedSensor, ...], Plan] = {}
-        self._wholes: dict[tuple[FittedSensor, ...], Plan] = {}
+        self._plans: dict[tuple[BoundSensor, ...], Plan] = {}
+        self._wholes: dict[tuple[BoundSensor, ...], Plan] = {}
         """Those from which others are taken."""
 
     def sample(
         self,
-        fitted: Sequence[FittedSensor],
+        fitted: Sequence[BoundSensor],
         view: SensingView,
-        whole: tuple[FittedSensor, ...] = (),
+        whole: tuple[BoundSensor, ...] = (),
         rows: NDArray[np.intp] | None = None,
     ) -> list[bytes | None]:
         """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
@@ -62,7 +62,7 @@ class Sensing:
         return plan.sample(view)
 
 
-def _keep(plans: dict[tuple[FittedSensor, ...], Plan], key: tuple[FittedSensor, ...], plan: Plan) -> Plan:
+def _keep(plans: dict[tuple[BoundSensor, ...], Plan], key: tuple[BoundSensor, ...], plan: Plan) -> Plan:
     while len(plans) >= PLANS_MAX:
         plans.pop(next(iter(plans)))
     plans[key] = plan
@@ -83,7 +83,7 @@ class _Group:
     what: str
     is_last: bool
 
-    def taken(self, places: NDArray[np.intp], fitted: Sequence[FittedSensor], tick: int) -> _Group | None:
+    def taken(self, places: NDArray[np.intp], fitted: Sequence[BoundSensor], tick: int) -> _Group | None:
         """Return those of them that are among some sensors, at these places or -1; None where none is."""
         there = places[self.places]
         rows = (there >= 0).nonzero()[0]
@@ -99,7 +99,7 @@ _Divided: TypeAlias = tuple[list[_Group], list[int]]
 """Groups, and the places of the sensors that work alone, or whose modifier does."""
 
 
-def _names(form: str, fitted: Sequence[FittedSensor], places: Sequence[int]) -> str:
+def _names(form: str, fitted: Sequence[BoundSensor], places: Sequence[int]) -> str:
     names = ", ".join([f"{fitted[place].channel} of {fitted[place].robot}" for place in places[:NAMED_MAX]])
     return f"{form} {names}{', ...' * (len(places) > NAMED_MAX)}"
 
@@ -108,7 +108,7 @@ class Plan:
     """What is done for one set of sensors, in which order. Raises ComponentError."""
 
     def __init__(
-        self, fitted: tuple[FittedSensor, ...], tick: int, known: tuple[_Divided, list[_Divided]] | None = None
+        self, fitted: tuple[BoundSensor, ...], tick: int, known: tuple[_Divided, list[_Divided]] | None = None
     ) -> None:
         """`known` are the groups of sensors and of modifiers, by depth, where they were taken from others."""
         self._fitted = fitted
@@ -120,7 +120,7 @@ class Plan:
         depth = max((len(one.modifiers) for one in fitted), default=0)
         self._steps = [self._step(place, tick) for place in range(depth)]
 
-    def taken(self, fitted: tuple[FittedSensor, ...], rows: NDArray[np.intp], tick: int) -> Plan:
+    def taken(self, fitted: tuple[BoundSensor, ...], rows: NDArray[np.intp], tick: int) -> Plan:
         """Return that of some of the sensors, by their rows, with the same bits. Raises ComponentError."""
         places = np.full(len(self._fitted), -1, np.intp)
         places[rows] = np.arange(len(rows))
@@ -219,23 +219,23 @@ def _computed(
         rows: Any = compute(*arguments)
         if isinstance(rows, np.ndarray) and rows.shape == shape and rows.dtype == np.float64:
             return cast("Numbers", rows)
-        raise WrongResult(compute, f"an array of float64 of the shape {shape}", rows)
+        raise ContractError(compute, f"an array of float64 of the shape {shape}", rows)
     except BaseException as error:
         raise component_error(group.what, "", view.tick, error) from error
 
 
-def _numbers(one: FittedSensor, reading: Any, view: SensingView) -> list[float]:
+def _numbers(one: BoundSensor, reading: Any, view: SensingView) -> list[float]:
     """Return the numbers of a reading, for modifiers. Raises ComponentError."""
     try:
         numbers = as_floats(one.codec.numbers(reading))
         if numbers is not None and len(numbers) == one.size:
             return numbers
-        raise WrongResult(one.sensor.sample, f"a reading of {one.size} numbers", reading)
+        raise ContractError(one.sensor.sample, f"a reading of {one.size} numbers", reading)
     except BaseException as error:
         raise one.failed(view.tick, error) from error
 
 
-def _payload(one: FittedSensor, reading: Any, view: SensingView) -> bytes | None:
+def _payload(one: BoundSensor, reading: Any, view: SensingView) -> bytes | None:
     """Return the bytes of a reading; None of one that was dropped, or has a number that is not finite."""
     if reading is None:
         return None
@@ -249,11 +249,11 @@ def _payload(one: FittedSensor, reading: Any, view: SensingView) -> bytes | None
         payload = one.codec.encode(reading)
         if len(payload) == 8 * one.size:
             return payload
-        raise WrongResult(one.sensor.sample, f"a reading of {one.size} numbers", reading)
+        raise ContractError(one.sensor.sample, f"a reading of {one.size} numbers", reading)
     except NotFinite:
         view.not_finite.append(one)
         return None
     except BadValue as error:
-        raise one.failed(view.tick, WrongResult(one.sensor.sample, error.problem, reading)) from error
+        raise one.failed(view.tick, ContractError(one.sensor.sample, error.problem, reading)) from error
     except BaseException as error:
         raise one.failed(view.tick, error) from error

@@ -106,5 +106,5 @@ class Surroundings:
             return None
         if entity.name not in self._bodies:
             at = mounting_of(self._spec, self._layout, entity)
-            self._bodies[entity.name] = entity.kind.made(self._spec.settings_of(entity.name), at).body()
+            self._bodies[entity.name] = entity.kind.factory(self._spec.settings_of(entity.name), at).body()
         return self._bodies[entity.name]

@@ -8,15 +8,14 @@ and the layout.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from foosim.common.errors import BadValue, Failed
 from foosim.common.finding import Location
 from foosim.world.forms.failures import failure_of
-from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.spec import WorldSpec
@@ -39,7 +38,7 @@ class ComponentError(Failed):
         self.component, self.entity, self.tick, self.cause = component, entity, tick, cause
 
 
-class Misfit(BadValue):
+class IncompatibleComponent(BadValue):
     """A setting of a component that its robot or its world does not fit; `path` leads to it from the component's."""
 
     def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
@@ -72,12 +71,8 @@ def called(component: str, entity: str, tick: int, call: Callable[..., Result], 
 
 def has_together(kind: type[Any], alone: str) -> bool:
     """Whether a class has `together`, and not only one that it inherits beside another method `alone` of its own."""
-    for one in kind.__mro__:
-        if "together" in vars(one):
-            return True
-        if alone in vars(one):
-            return False
-    return False
+    own: type[Any] = next((one for one in kind.__mro__ if "together" in vars(one) or alone in vars(one)), object)
+    return vars(own).get("together") is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,11 +170,23 @@ class WritableView(View):
 
     __slots__ = ("_commands", "_written")
 
-    def __init__(self, tick: int, numbers: list[float], start: Sequence[float] | None = None) -> None:
+    def __init__(
+        self,
+        tick: int,
+        numbers: Sequence[float],
+        start: Sequence[float] | None = None,
+        written: list[float] | None = None,
+        values: NDArray[np.float64] | None = None,
+    ) -> None:
+        """`written` are other numbers than those that are read, where motions write the state at the end of a tick;
+        `values` are the numbers as an array where there is one already."""
         self.tick, self.numbers, self.count = tick, numbers, 0  # as a View has them: there are several in each tick
         self.start = numbers if start is None else start
-        self._values: NDArray[np.float64] | None = None
-        self._written = numbers
+        self._values: NDArray[np.float64] | None = values
+        if written is None:
+            assert isinstance(numbers, list), "numbers that are written"
+            written = numbers
+        self._written = written
         self._commands: dict[object, int] = {}
 
     @property
@@ -205,24 +212,6 @@ class WritableView(View):
         for slot, row in zip(slots, rows, strict=True):
             assert slot.is_own and len(row) == slot.size, slot
             written[slot.at : slot.at + slot.size] = row
-
-
-class SolvingView(WritableView):
-    """A view in which entities go on: `numbers` are those at the start of the tick, what is written is at its end."""
-
-    __slots__ = ()
-
-    def __init__(
-        self,
-        tick: int,
-        start: Sequence[float],
-        written: list[float],
-        values: NDArray[np.float64] | None = None,
-    ) -> None:
-        """`values` are the numbers at the start as an array; None: it is made where somebody asks for it."""
-        super().__init__(tick, written, start)
-        self.numbers = start
-        self._values = values
 
 
 class SensingView(WritableView):
@@ -308,81 +297,3 @@ class ModifierMounting:
         if written is None:
             return [other] * self.numbers.size
         return [other if number is None else number for number in read_per_field(written, self.numbers)]
-
-
-class Sensor(Protocol):
-    """What the tick of a node asks of a sensor. It is made from its settings and its mounting.
-
-    A class may have four more methods: the static `check(settings, at)`, which raises Misfit where the settings do not
-    fit robot or world; `limits()`, the least and greatest value of each field that it can measure;
-    the static `together(sensors)`, which returns an object whose `sample(view)` gives the numbers of the readings of
-    several as an array of shape (sensors, numbers), with the same bits; and the static `rays(sensors, numbers)`, which
-    returns both ends of each ray that several send, as an array of shape (rays, 6) in the world's frame (m), to be
-    drawn. Readings of those that are asked together are of one length.
-    """
-
-    def sample(self, view: WritableView) -> Any:
-        """Return what is measured: a value of the registered reading."""
-
-
-class Modifier(Protocol):
-    """What is asked of a modifier. It is made from its settings and its mounting; it works on numbers alone.
-
-    A class may have further methods: the static `check(settings, numbers)`, which raises BadValue where the settings do
-    not fit the numbers that it is on (`forms.per_field.Numbers`); the static `together(modifiers)`, which returns an
-    object whose `apply(values, view)` does the same to an array of shape (modifiers, numbers), and for commands
-    `accept`, which takes one in place of `apply`, with `due(view)`, which returns one that had to wait and takes effect
-    at this tick, or None.
-    """
-
-    def apply(self, values: list[float], view: WritableView) -> list[float] | None:
-        """Return what becomes of the numbers of a value; None: it is dropped."""
-
-
-class Actuator(Protocol):
-    """What the tick of a node asks of an actuator. It is made from its settings and its mounting.
-
-    The setting `joints` of its registration names the joints that it commands, so that several may share a robot.
-    `steady = True` of a class says that what it asks follows from the state and its slots alone, whatever the tick is:
-    a rod that such actuators have left as it was stays so, unsolved.
-
-    A class may have seven more methods: `wrench(view)`, which returns a force (N) at the centre of mass of a free rigid
-    base and a torque (N m), both in its principal axes; `bounds()`, which returns the least and the greatest value of
-    each number of a command, where that is numbers whose fields have several each; `within(command)`, which returns the
-    command that is carried out instead, where limits are of several numbers together; `names()`, what the numbers of a
-    command are called; `problem(command)`, why `accept` refuses a command in every state, empty if it does not, for a
-    warning; `unpowered()`, which returns what is asked of the motors of a robot without power; where there is none,
-    that is a speed of 0 with the force or acceleration of `command`. The static `together(actuators)` returns an object
-    whose `command(view)` gives what several ask, of robots that move by kinematics, as an array of shape (actuators,
-    motors, 2), with the same bits.
-    """
-
-    def accept(self, command: Any, view: WritableView) -> bool:
-        """Take a command within the limits, a value of the registered type, into the slots; False: it is refused."""
-
-    def limits(self) -> Mapping[str, tuple[float, float]]:
-        """Return the least and the greatest value of each field of a command that has bounds."""
-
-    def hold(self, view: WritableView) -> None:
-        """Ask for the present state from here on: the robot is taken out of service, or put back into it."""
-
-    def stir(self, view: WritableView) -> None:
-        """Ask for some motion, for the fixed small run that tells engines apart."""
-
-    def command(self, view: View) -> tuple[tuple[float, ...], ...]:
-        """Return (target speed, greatest force or acceleration) of each motor of the robot, in SI units.
-
-        For motors of rigid bodies a third number may follow, `drives.Motor.slope`.
-        """
-
-
-class JobActuator(Actuator, Protocol):
-    """An actuator whose commands may be jobs: registered with `jobs=True`, its command has a last field `job`.
-
-    `accept` gets the command of a job as any other one, without its number. `hold` is called besides when a job is
-    cancelled or fails. A class with a slot `failure` says by that why it could not do what it was told last: it has the
-    sentences by the numbers in `FAILURES`.
-    """
-
-    def progress(self, view: WritableView) -> JobState:
-        """Return, after the robot was solved and while a job runs, whether it runs on, is done or has failed."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import wraps
 from typing import Any, Final, NoReturn
 
-from foosim.world.components.fitted import FittedActuator, FittedModifier
+from foosim.world.components.fitted import BoundActuator, BoundModifier
 from foosim.world.components.view import View
 
 ALONE: Final = "numbers of a frame are written by view.write alone"
@@ -45,7 +45,7 @@ class _Seen(Sequence[float]):
     __setitem__ = __delitem__ = _refuse
 
 
-class Watched:
+class WriteGuard:
     """A form whose calls can only read the numbers that they are given."""
 
     def __init__(self, made: Any) -> None:
@@ -72,18 +72,15 @@ class Watched:
         return call
 
 
-def watched(made: Any) -> Any:
+def guarded(made: Any) -> Any:
     """Return a form that is watched; of any type, since it has the methods of what it was."""
-    return Watched(made)
+    return WriteGuard(made)
 
 
-def watched_actuator(one: FittedActuator) -> FittedActuator:
+def guarded_actuator(one: BoundActuator) -> BoundActuator:
     """Return an actuator that is watched, with its modifiers."""
-    return replace(one, actuator=watched(one.actuator), modifiers=tuple(map(_watched_modifier, one.modifiers)))
+    return replace(one, actuator=guarded(one.actuator), modifiers=tuple(map(_guarded_modifier, one.modifiers)))
 
 
-def _watched_modifier(one: FittedModifier) -> FittedModifier:
-    made = watched(one.modifier)
-    return replace(
-        one, modifier=made, apply_command=getattr(made, "accept", made.apply), due=getattr(made, "due", None)
-    )
+def _guarded_modifier(one: BoundModifier) -> BoundModifier:
+    return replace(one, modifier=guarded(one.modifier))

@@ -11,7 +11,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.components.view import Misfit, Mounting
+from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.forms.settings import EntityRuleSettings, Tag
 from foosim.world.layout import Entity
 from foosim.world.models.rover import Charge, RoverRobot
@@ -107,13 +107,14 @@ def batteries_of(spec: WorldSpec, robot: Entity) -> dict[str, BatteryRuleSetting
 
 
 def check_battery(settings: BatteryRuleSettings, at: Mounting) -> None:
-    """Raise Misfit for a rover with numbers of its own, for another robot without a capacity, and for two batteries."""
+    """Raise IncompatibleComponent for a rover with numbers of its own, for another robot without a capacity, and for
+    two batteries."""
     given = sorted(settings.model_fields_set - {"kind"})
     if is_rover(at.spec, at.robot) and given:
         valid = "its battery is that of hall.rover.battery, hall.station charges it"
-        raise Misfit((given[0],), f"not of a rover of the hall: {valid}", given[0])
+        raise IncompatibleComponent((given[0],), f"not of a rover of the hall: {valid}", given[0])
     if not is_rover(at.spec, at.robot) and settings.capacity is None:
-        raise Misfit(("kind",), "a battery without a capacity, such as capacity: 200 Wh", settings.kind)
+        raise IncompatibleComponent(("kind",), "a battery without a capacity, such as capacity: 200 Wh", settings.kind)
     first, *more = batteries_of(at.spec, at.robot)
     if more and at.name != first:
-        raise Misfit(("kind",), f"a second battery of a robot: it has {first}", settings.kind)
+        raise IncompatibleComponent(("kind",), f"a second battery of a robot: it has {first}", settings.kind)

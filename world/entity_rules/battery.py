@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import sqrt
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
+from foosim.world.components.base import EntityRule
 from foosim.world.components.entities import Marked, MarkKind
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.energy.battery import BatteryRuleSettings, cell_of, chargers_of, check_battery, is_rover
-from foosim.world.forms.registry import entity_rule
+from foosim.world.forms.registry import rule
 from foosim.world.models.rover import CHARGE
 
 if TYPE_CHECKING:
@@ -24,11 +25,11 @@ if TYPE_CHECKING:
 EMPTY: Final = "empty"
 
 
-@entity_rule("battery", BatteryRuleSettings, slots={"charge": 1}, shared=("charge",), settable={"charge": CHARGE})
-class Battery:
+@rule("battery", BatteryRuleSettings, slots={"charge": 1}, shared=("charge",), settable={"charge": CHARGE})
+class Battery(EntityRule):
     """The charge of one robot (J)."""
 
-    mark_kinds: Final = {EMPTY: MarkKind("lost", "empty batteries")}
+    mark_kinds: ClassVar = {EMPTY: MarkKind("lost", "empty batteries")}
 
     def __init__(self, settings: BatteryRuleSettings, at: Mounting) -> None:
         self._name, self._dt = at.robot.name, at.spec.tick_ns / 1e9
@@ -53,7 +54,7 @@ class Battery:
 
     @staticmethod
     def check(settings: BatteryRuleSettings, at: Mounting) -> None:
-        """Raise Misfit for a battery that the robot cannot have."""
+        """Raise IncompatibleComponent for a battery that the robot cannot have."""
         check_battery(settings, at)
 
     def place(self, view: WritableView) -> None:

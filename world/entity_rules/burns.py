@@ -7,17 +7,18 @@ with an empty battery do (`has_power`). A rule of the world could only write `do
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final
 
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import EntityRule
 from foosim.world.components.entities import Marked, MarkKind
 from foosim.world.components.fires import Fires
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.forms import DOWN
-from foosim.world.forms.registry import entity_rule
+from foosim.world.forms.registry import rule
 from foosim.world.forms.settings import EntityRuleSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 
@@ -38,11 +39,11 @@ class BurnsSettings(EntityRuleSettings):
     after_ns: After = default("1 s", "after")
 
 
-@entity_rule("burns", BurnsSettings, slots={"inside_ticks": 1, BURNT: 1}, writes=(DOWN,))
-class Burns:
+@rule("burns", BurnsSettings, slots={"inside_ticks": 1, BURNT: 1}, writes=(DOWN,))
+class Burns(EntityRule):
     """How long a robot has been in fires, and whether it has burnt. Put into service again, it is as new."""
 
-    mark_kinds: Final = {BURNT: MarkKind("lost", "robots that have burnt")}
+    mark_kinds: ClassVar = {BURNT: MarkKind("lost", "robots that have burnt")}
 
     def __init__(self, settings: BurnsSettings, at: Mounting) -> None:
         self._name, self._field = at.robot.name, f"{at.name}.{BURNT}"
@@ -52,7 +53,7 @@ class Burns:
 
     @staticmethod
     def check(settings: BurnsSettings, at: Mounting) -> None:
-        """Raise Misfit for a robot without a body, and for a link that it does not have."""
+        """Raise IncompatibleComponent for a robot without a body, and for a link that it does not have."""
         Mounted(at, settings.at)
 
     def has_power(self, view: View) -> bool:

@@ -17,12 +17,12 @@ TEXT_LENGTH_MAX: Final = 500
 VALUE_LENGTH_MAX: Final = 80
 
 
-class WrongResult(Exception):
+class ContractError(Exception):
     """A method of a form has returned something else than it must. `method` is where that is to be changed."""
 
     def __init__(self, method: Callable[..., Any], needed: str, given: object) -> None:
         name = getattr(method, "__name__", type(method).__name__)
-        super().__init__(f"{name} gives {_value(given)}, where {needed} is needed")
+        super().__init__(f"{name}() returned {_value(given)}; expected {needed}")
         self.method = method
 
 
@@ -44,7 +44,7 @@ def failure_of(error: BaseException, module: str = "") -> str:
         said = error.msg if isinstance(error, SyntaxError) else str(error)  # which has its place behind it
         text = " ".join(said.split())
     text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
-    if isinstance(error, WrongResult):
+    if isinstance(error, ContractError):
         return text + place_of_code(error.method)
     return (f"{kind}: {text}" if text else kind) + _place_of(error, module)
 

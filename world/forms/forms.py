@@ -31,6 +31,8 @@ NO_ENTITY: Final = -1.0
 
 SAMPLES: Final = "samples"
 """The slot of each sensor that counts what it has sampled; no component declares one of this name."""
+BASE_CLASSES: Final = "foosim.world.components.base"
+"""The module of the base classes of components."""
 ROBOTS: Final = "*"
 SLOTS_MAX: Final = 65_536
 """Numbers in all slots of one component, model, motion or rule."""
@@ -95,6 +97,12 @@ class Carrier:
     joints: int = 0
 
 
+def overrides(kind: Callable[..., Any], hook: str) -> bool:
+    """Whether a class of components has a hook of its own, and not the empty one of its base class."""
+    having = [one for one in getattr(kind, "__mro__", ()) if hook in vars(one)]
+    return bool(having) and having[0].__module__ != BASE_CLASSES
+
+
 def word_of(form: str) -> str:
     """Return what one of a form is called."""
     return WORDS.get(form, form)
@@ -156,29 +164,29 @@ def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sen
     return found  # type: ignore[no-any-return]
 
 
-SpeaksOf: TypeAlias = Callable[[Any], str]
+TriggerOf: TypeAlias = Callable[[Any], str]
 """What makes a sensor measure besides its rate, by its settings."""
-SeveralOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
+ArrayLengthOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
 """How many numbers the last fields of a reading have, by the settings and by how many each field of the robot has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Form:
+class ComponentType:
     """A registered class: its form and name, the class, and the model of its settings.
 
     `kit` is the section that a deployment must have, empty where any world will do.
     """
 
-    form: str
+    type_name: str
     name: str
-    made: Callable[..., Any]
+    factory: Callable[..., Any]
     settings: type[SpecBase]
     kit: str = ""
 
     @property
     def module(self) -> str:
         """The module that it is in."""
-        return self.made.__module__
+        return self.factory.__module__
 
     @property
     def is_own(self) -> bool:
@@ -188,21 +196,21 @@ class Form:
     @property
     def summary(self) -> str:
         """The first line of its docstring."""
-        return (self.made.__doc__ or "").strip().partition("\n")[0]
+        return (self.factory.__doc__ or "").strip().partition("\n")[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Component(Form):
+class Component(ComponentType):
     """A sensor, actuator or modifier.
 
     `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers that it remembers, by
     field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
-    that the model of its robot must have. `several` is the setting that says how many numbers the last field of a
+    that the model of its robot must have. `array_length` is the setting that says how many numbers the last field of a
     reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
     `moves` says that an actuator commands the motors of its robot, `joints` which: it is the setting that names their
     joints, in the order of what the actuator asks. All are meant without such a setting, and where that is None. No
     motor is commanded by two actuators. `jobs` says that its commands may be jobs (`forms.jobs`).
-    `speaks` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
+    `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0; or a function that says it, which may name a slot of an actuator.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
@@ -212,8 +220,8 @@ class Component(Form):
     value: type[Struct] | None = None
     slots: Mapping[str, int] | SlotsOf = field(default_factory=dict)
     needs: tuple[str, ...] = ()
-    several: str | SeveralOf = ""
-    speaks: str | SpeaksOf = ""
+    array_length: str | ArrayLengthOf = ""
+    trigger: str | TriggerOf = ""
     shown_as: str = ""
     moves: bool = False
     joints: str = ""
@@ -225,11 +233,11 @@ class Component(Form):
         follow from them."""
         if not callable(self.slots):
             return self.slots
-        return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.form == "sensor")
+        return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.type_name == "sensor")
 
-    def speaks_by(self, settings: Any) -> str:
+    def trigger_by(self, settings: Any) -> str:
         """Return what makes a sensor with these settings measure besides its rate; empty for nothing."""
-        return self.speaks(settings) if callable(self.speaks) else self.speaks
+        return self.trigger(settings) if callable(self.trigger) else self.trigger
 
     def joints_named(self, settings: Any) -> Sequence[str] | None:
         """Return the joints that an actuator with these settings commands; None for all. Raises BadValue."""
@@ -240,16 +248,17 @@ class Component(Form):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Model(Form):
+class Model(ComponentType):
     """A model of entities.
 
     `slots` are the fields of its state, or a function of settings and world that returns them. Those that foosim itself
     needs it has whatever it declares: robots `down`, `refused` and `clamped`, what is solved `quarantined`. An engine
-    solves one that is rigid; one with a `motion` goes on by that; any other stays as it is. A robot has an owner, and
-    sends and receives packets. `actuators` and `rules` are those of a robot that says nothing of them, as in a
-    deployment. `units` are those of its fields' numbers, the last one standing for all behind it; fields that every
-    model calls the same need none. `variants` are what it is instead where its setting `dynamics` has one of these
-    values. `settable` is what can be set of it, as of a rule of entities (`EntityRule`): fields of its state.
+    solves one that is rigid; one with a `motion`, a class derived from `components.base.Motion`, moves by that; any
+    other stays as it is. A robot has an owner, and sends and receives packets. `actuators` and `rules` are those of a
+    robot that says nothing of them, as in a deployment. `units` are those of its fields' numbers, the last one standing
+    for all behind it; fields that every model calls the same need none. `variants` are what it is instead where its
+    setting `dynamics` has one of these values. `settable` is what can be set of it, as of a rule of entities
+    (`EntityRule`): fields of its state.
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
@@ -261,7 +270,7 @@ class Model(Form):
     is_rigid: bool = False
     couples: bool = True
     """Whether something in it couples its parts, as the motors of an arm do: its island has a solve of its own."""
-    motion: str = ""
+    motion: type[Any] | None = None
     actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
@@ -276,7 +285,12 @@ class Model(Form):
     @property
     def is_solved(self) -> bool:
         """Whether a node computes its next state; that of any other stays as it is."""
-        return self.is_rigid or bool(self.motion)
+        return self.is_rigid or self.motion is not None
+
+    @property
+    def mover(self) -> str:
+        """What moves its entities, in a word."""
+        return "an engine" if self.is_rigid else "nothing" if self.motion is None else self.motion.__name__
 
     @property
     def declared(self) -> Mapping[str, int] | None:
@@ -315,20 +329,7 @@ class Model(Form):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion(Form):
-    """How entities without rigid-body dynamics go on.
-
-    `needs` are the fields of an entity that it reads, `writes` those that it alone writes, `slots` what it remembers
-    besides, as `motion.FIELD`.
-    """
-
-    needs: tuple[str, ...] = ()
-    writes: tuple[str, ...] = ()
-    slots: Mapping[str, int] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorldRule(Form):
+class WorldRule(ComponentType):
     """What a world does by itself, before a tick is solved.
 
     `slots` are what it remembers, as `NAME.FIELD` of the entity `world`, NAME being that of the rule in its world;
@@ -343,7 +344,7 @@ class WorldRule(Form):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EntityRule(Form):
+class EntityRule(ComponentType):
     """What an entity does by itself, after it was solved, computed by the node that solves it.
 
     `slots` are what it remembers, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` those
@@ -368,27 +369,39 @@ class EntityRule(Form):
         return (*self.writes, *self.shared)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Engine(Form):
-    """What computes rigid bodies.
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """What computes rigid bodies: `module:Class` of what is made from deployment and layout (`node.physics.interface`).
 
     `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
-    after the other (`node.physics.interface.IslandEngine`). Any other has rods and balls of a table. `grasps` says that
-    it holds two bodies together as `Island.welds` say.
+    after the other (`IslandEngine`). Any other has rods and balls of a table. `grasps` says that it holds two bodies
+    together as `Island.welds` say.
     """
 
+    name: str
+    path: str
     meshes: bool = False
     islands: bool = False
     grasps: bool = False
 
 
+ENGINES: Final[dict[str, Engine]] = {
+    "bullet": Engine("bullet", "foosim.node.physics.bullet_engine:BulletEngine", meshes=True),
+    "mujoco": Engine(
+        "mujoco", "foosim.node.physics.mujoco_islands:MujocoIslands", meshes=True, islands=True, grasps=True
+    ),
+    "pure": Engine("pure", "foosim.node.physics.pure_engine:PureEngine"),
+}
+"""The engines by name; a package adds its own in a module that it names as an entry point."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene(Form):
+class Scene(ComponentType):
     """Scenery that never moves, made from settings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kit(Form):
+class Kit(ComponentType):
     """A section of a deployment that makes a world from few numbers.
 
     `entities` are what is in the world beside the robots, their models by name; `spares` returns the same of what is

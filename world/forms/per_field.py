@@ -76,7 +76,7 @@ class Numbers:
 
 def codec_of(component: Component) -> PayloadCodec:
     """Return the codec of a component's readings or commands."""
-    assert component.value is not None, f"{component.form} {component.name} carries nothing"
+    assert component.value is not None, f"{component.type_name} {component.name} carries nothing"
     return _codec(component.value, component.name)
 
 
@@ -93,12 +93,12 @@ def numbers_of(
     """
     fields = codec_of(component).fields
     many = many_of(fields)
-    if not all(field.is_number for field in fields[: len(fields) - many]) or (many and not component.several):
+    if not all(field.is_number for field in fields[: len(fields) - many]) or (many and not component.array_length):
         return None
     size = len(fields) - many
     if many:
-        several = component.several
-        size += many * (several(settings, counts) if callable(several) else getattr(settings, several))
+        length = component.array_length
+        size += many * (length(settings, counts) if callable(length) else getattr(settings, length))
     return Numbers(fields, getattr(component.value, GROUPS, {}), size)
 
 
@@ -115,7 +115,7 @@ def payload_bytes(component: Component, settings: ComponentSettings, counts: Map
         return codec.size
     many = many_of(codec.fields)
     singles = codec.fields[: len(codec.fields) - many]
-    is_of_joints = component.form == "actuator" and "joint_positions" in component.needs
+    is_of_joints = component.type_name == "actuator" and "joint_positions" in component.needs
     if not is_of_joints or not all(field.is_number for field in singles):
         return None
     joints = len(component.joints_named(settings) or ()) or counts["joint_positions"]

@@ -15,25 +15,20 @@ from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.common.names import CLASS_PATTERN, class_path_of, nearest_name, quoted
 from foosim.world.forms.failures import failure_of, in_library
 from foosim.world.forms.forms import (
-    NO_SETTINGS,
-    NO_SLOTS,
+    ENGINES,
     Component,
+    ComponentType,
     Engine,
     EntityRule,
-    Form,
     Kit,
     Model,
-    Motion,
     Scene,
-    SeveralOf,
-    SlotsOf,
-    SpeaksOf,
     WorldRule,
     with_article,
     word_of,
@@ -52,7 +47,6 @@ if TYPE_CHECKING:
 GROUP: Final = "foosim.world"
 FOLDERS: Final[Mapping[str, str]] = {
     "model": "foosim.world.models",
-    "motion": "foosim.world.motions",
     "sensor": "foosim.world.sensors",
     "actuator": "foosim.world.actuators",
     "modifier": "foosim.world.modifiers",
@@ -60,7 +54,6 @@ FOLDERS: Final[Mapping[str, str]] = {
     "entity_rule": "foosim.world.entity_rules",
     "scene": "foosim.world.scenes",
     "kit": "foosim.world.kits",
-    "engine": "foosim.node.engines",
 }
 """Where foosim's own are, by form."""
 FORMS: Final = tuple(FOLDERS)
@@ -69,184 +62,102 @@ BY_CLASS: Final = "module:Class"
 
 Made = TypeVar("Made", bound=Callable[..., Any])
 
-_known: Final[dict[tuple[str, str], Form]] = {}
+
+class Decorator(Protocol):
+    """What registers a class, and returns it."""
+
+    def __call__(self, made: Made, /) -> Made: ...
+
+
+_known: Final[dict[tuple[str, str], ComponentType]] = {}
 _loaded: Final[dict[str, str]] = {}
 """Of each entry point that was loaded: why that failed, empty if it did not."""
 
 
-def sensor(  # noqa: PLR0913  # what a sensor is, by keyword
-    name: str,
-    settings: type[ComponentSettings],
-    reading: type[Struct],
-    *,
-    slots: Mapping[str, int] | SlotsOf = NO_SLOTS,
-    needs: tuple[str, ...] = (),
-    kit: str = "",
-    several: str | SeveralOf = "",
-    speaks: str | SpeaksOf = "",
-    shown_as: str = "",
-) -> Callable[[Made], Made]:
-    """Register a sensor: a class with the methods of `components.view.Sensor`.
+def sensor(name: str, settings: type[ComponentSettings], reading: type[Struct], **about: Any) -> Decorator:
+    """Register a sensor: a class derived from `components.base.Sensor`; `about` are fields of `forms.Component`."""
+    return _registering(Component, "sensor", name, settings, value=reading, **about)
 
-    `shown_as` names the message by which captures show its readings to viewers: one of `forms.shown.MESSAGES`.
+
+def actuator(name: str, settings: type[ComponentSettings], command: type[Struct], **about: Any) -> Decorator:
+    """Register an actuator: a class derived from `components.base.Actuator`; `about` are fields of `forms.Component`.
+
+    It commands motors of its robot unless `moves` is False.
     """
-
-    def describe(made: Callable[..., Any]) -> Component:
-        return Component(
-            form="sensor",
-            name=name,
-            made=made,
-            settings=settings,
-            value=reading,
-            slots=slots,
-            needs=needs,
-            kit=kit,
-            several=several,
-            speaks=speaks,
-            shown_as=shown_as,
-        )
-
-    return _registering(describe)
+    return _registering(Component, "actuator", name, settings, value=command, **{"moves": True, **about})
 
 
-def actuator(  # noqa: PLR0913  # what an actuator is, by keyword
-    name: str,
-    settings: type[ComponentSettings],
-    command: type[Struct],
-    *,
-    slots: Mapping[str, int] | SlotsOf = NO_SLOTS,
-    needs: tuple[str, ...] = (),
-    kit: str = "",
-    moves: bool = True,
-    joints: str = "",
-    jobs: bool = False,
-) -> Callable[[Made], Made]:
-    """Register an actuator: a class with the methods of `components.view.Actuator`; with `jobs`, of `JobActuator`."""
-
-    def describe(made: Callable[..., Any]) -> Component:
-        return Component(
-            form="actuator",
-            name=name,
-            made=made,
-            settings=settings,
-            value=command,
-            slots=slots,
-            needs=needs,
-            kit=kit,
-            moves=moves,
-            joints=joints,
-            jobs=jobs,
-        )
-
-    return _registering(describe)
+def modifier(name: str, settings: type[ComponentSettings], **about: Any) -> Decorator:
+    """Register a modifier: a class derived from `components.base.Modifier`; `about` are fields of `forms.Component`."""
+    return _registering(Component, "modifier", name, settings, **about)
 
 
-def modifier(
-    name: str,
-    settings: type[ComponentSettings],
-    *,
-    slots: Mapping[str, int] | SlotsOf = NO_SLOTS,
-    per_field: Mapping[str, float | None] = NO_SETTINGS,
-) -> Callable[[Made], Made]:
-    """Register a modifier: a class with the methods of `components.view.Modifier`."""
-    return _registering(
-        lambda made: Component(
-            form="modifier", name=name, made=made, settings=settings, slots=slots, per_field=per_field
-        )
-    )
-
-
-def model(name: str, settings: type[EntitySettings], **about: Any) -> Callable[[Made], Made]:
-    """Register a model: a class with the methods of `entities.Model`; `about` are fields of `forms.Model`.
+def model(name: str, settings: type[EntitySettings], **about: Any) -> Decorator:
+    """Register a model: a class derived from `components.base.Model`; `about` are fields of `forms.Model`.
 
     The fields that foosim itself needs, and that it does not declare, come after those that it does. `variants` are
     classes of the same module by the value of the setting `dynamics`, each with the fields that differ:
-    `{"rigid": {"made": Rigid, "is_rigid": True, ...}}`.
+    `{"rigid": {"factory": Rigid, "is_rigid": True, ...}}`.
     """
-    others: Any = about.pop("variants", {})
-
-    def describe(made: Callable[..., Any]) -> Model:
-        found = Model(form="model", name=name, made=made, settings=settings, **about)
-        variants = others
-        if isinstance(others, Mapping) and all(isinstance(its, Mapping) for its in others.values()):
-            variants = {value: _with_needed(replace(found, **its)) for value, its in others.items()}
-        return replace(_with_needed(found), variants=variants)
-
-    return _registering(describe)
+    return _registering(Model, "model", name, settings, **about)
 
 
-def _with_needed(found: Model) -> Model:
-    declared: Any = found.slots
-    if not isinstance(declared, Mapping):
-        return found  # they follow from settings, or it is refused
-    return replace(found, slots={**declared, **{slot: 1 for slot in found.needed if slot not in declared}})
+def rule(name: str, settings: type[ComponentSettings], **about: Any) -> Decorator:
+    """Register a rule: a class derived from `components.base.Rule`, or from `EntityRule`; `about` are fields of
+    `forms.WorldRule` or `forms.EntityRule`."""
 
-
-def motion(name: str, **about: Any) -> Callable[[Made], Made]:
-    """Register a motion: a class with the methods of `entities.Motion`; `about` are fields of `forms.Motion`.
-
-    Its settings are those of the models that go on by it.
-    """
-    return _registering(lambda made: Motion(form="motion", name=name, made=made, settings=ComponentSettings, **about))
-
-
-def rule(name: str, settings: type[ComponentSettings], **about: Any) -> Callable[[Made], Made]:
-    """Register a rule of worlds: a class with the methods of `entities.Rule`; `about`: fields of `forms.WorldRule`."""
-    return _registering(lambda made: WorldRule(form="rule", name=name, made=made, settings=settings, **about))
-
-
-def entity_rule(name: str, settings: type[ComponentSettings], **about: Any) -> Callable[[Made], Made]:
-    """Register a rule of entities: a class with the methods of `entities.EntityRule`; `about` are fields of
-    `forms.EntityRule`."""
-    return _registering(lambda made: EntityRule(form="entity_rule", name=name, made=made, settings=settings, **about))
-
-
-def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Callable[[Made], Made]:
-    """Register a scene: a function of its settings that returns its shapes."""
-    return _registering(lambda made: Scene(form="scene", name=name, made=made, settings=settings, kit=kit))
-
-
-def engine(name: str, *, meshes: bool, islands: bool = False, grasps: bool = False) -> Callable[[Made], Made]:
-    """Register an engine: a class with the methods of `node.physics.interface.EngineKind`."""
-    return _registering(
-        lambda made: Engine(
-            form="engine",
-            name=name,
-            made=made,
-            settings=ComponentSettings,
-            meshes=meshes,
-            islands=islands,
-            grasps=grasps,
-        )
-    )
-
-
-def kit(name: str, settings: type[SpecBase], **about: Any) -> Callable[[Made], Made]:
-    """Register a kit: a class with the methods of `entities.Kit`; `about` are fields of `forms.Kit`."""
-    return _registering(lambda made: Kit(form="kit", name=name, made=made, settings=settings, **about))
-
-
-def _registering(describe: Callable[[Callable[..., Any]], Form]) -> Callable[[Made], Made]:
     def register(made: Made) -> Made:
-        found = describe(made)
+        is_of_entity = getattr(made, "type_name", "") == "entity_rule"
+        kind, form = (EntityRule, "entity_rule") if is_of_entity else (WorldRule, "rule")
+        return _registering(kind, form, name, settings, **about)(made)
+
+    return register
+
+
+def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Decorator:
+    """Register the scene of a kit, or one by itself: a function of its settings that returns its shapes."""
+    return _registering(Scene, "scene", name, settings, kit=kit)
+
+
+def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
+    """Register a kit: a class derived from `components.base.Kit`; `about` are fields of `forms.Kit`."""
+    return _registering(Kit, "kit", name, settings, **about)
+
+
+def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **about: Any) -> Decorator:
+    def register(made: Made) -> Made:
+        found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **about})
         check_form(found)
-        key = found.form, found.name
+        key = form, name
         own = own_module(*key)
         if found.module != own and _is_there(*key):
-            raise Refused(f"{found.form} {found.name} is registered by {found.module}, and is in {own}")
+            raise Refused(f"{form} {name} is registered by {found.module}, and is in {own}")
         first = _known.setdefault(key, found)
-        if (first.module, first.made.__qualname__) != (found.module, made.__qualname__):
-            raise Refused(f"{found.form} {found.name} is registered by {first.module} and {found.module}")
+        if (first.module, first.factory.__qualname__) != (found.module, made.__qualname__):
+            raise Refused(f"{form} {name} is registered by {first.module} and {found.module}")
         _known[key] = found
         return made
 
     return register
 
 
+def _described(kind: type[Any], about: dict[str, Any]) -> Any:
+    """Return the description of what is registered; that of a model has the fields that foosim needs, and variants."""
+    variants = about.pop("variants", {})
+    found = kind(**about)
+    if not isinstance(found, Model):
+        return found
+    of_variants = {value: _described(Model, {**about, **its}) for value, its in variants.items()}
+    declared = found.slots
+    if isinstance(declared, Mapping):
+        declared = {**declared, **{slot: 1 for slot in found.needed if slot not in declared}}
+    return replace(found, slots=declared, variants=of_variants)
+
+
 # --- finding ---------------------------------------------------------------------------------------------------------
 
 
-def find(form: str, kind: str) -> Form:
+def find(form: str, kind: str) -> ComponentType:
     """Return what a deployment calls `kind`: a registered name, or `module:Class`.
 
     Raises UnknownName, which says what is nearest, and BadValue for a module that cannot be imported, or a class in it
@@ -260,10 +171,11 @@ def find(form: str, kind: str) -> Form:
 
 def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
     """Return the error for a name that nothing has, with the packages that could not be imported."""
-    return UnknownName("; ".join([f"unknown {word_of(form)}", *load_entry_points()]), kind, choices, f"any {BY_CLASS}")
+    others = () if form == "engine" else (f"any {BY_CLASS}",)
+    return UnknownName("; ".join([f"unknown {word_of(form)}", *load_entry_points()]), kind, choices, *others)
 
 
-def lookup(form: str, kind: str) -> Form | None:
+def lookup(form: str, kind: str) -> ComponentType | None:
     """Return what `find` does, or None where nothing has that name; raises BadValue for a class as `find` does."""
     if ":" in kind:
         return _of_class(form, kind)
@@ -272,6 +184,19 @@ def lookup(form: str, kind: str) -> Form | None:
         load_entry_points()
         found = _known.get((form, kind))
     return found
+
+
+def find_engine(name: str) -> Engine:
+    """Return an engine; raises UnknownName."""
+    if name not in ENGINES and name not in engines():
+        raise unknown("engine", name, engines())
+    return ENGINES[name]
+
+
+def engines() -> list[str]:
+    """Return the names of the engines of foosim and of installed packages, in name order."""
+    load_entry_points()
+    return sorted(ENGINES)
 
 
 def find_component(form: str, kind: str) -> Component:
@@ -330,7 +255,7 @@ def _load(entry: EntryPoint) -> str:
     return ""
 
 
-def _own(form: str, name: str) -> Form | None:
+def _own(form: str, name: str) -> ComponentType | None:
     """Return one of foosim's own, imported from its module; None where there is none."""
     if _is_there(form, name):
         import_module(own_module(form, name))
@@ -403,19 +328,19 @@ def _not_found(path: str, missing: str) -> BadValue:
     return BadValue(f"there is no module {missing}{hint}", path, quoted(found))
 
 
-def _of_class(form: str, path: str) -> Form:
+def _of_class(form: str, path: str) -> ComponentType:
     """Return the one that `module:Class` registered."""
     made, module = class_at(path), path.partition(":")[0]
-    of_form = [one for one in _known.values() if one.form == form]
+    of_form = [one for one in _known.values() if one.type_name == form]
     for one in of_form:
-        if one.made is made:
+        if one.factory is made:
             return one
-    there = sorted(one.made.__qualname__ for one in of_form if one.module == module)
+    there = sorted(one.factory.__qualname__ for one in of_form if one.module == module)
     hint = f"; {module} registers {', '.join(there)}" if there else ""
     raise BadValue(f"not registered as {with_article(word_of(form))}{hint}", path)
 
 
-def _forget_new(known: Mapping[tuple[str, str], Form]) -> None:
+def _forget_new(known: Mapping[tuple[str, str], ComponentType]) -> None:
     """Forget what modules have registered that then could not be imported; what they imported before stays."""
     for key in _known.keys() - known.keys():
         if _known[key].module not in sys.modules:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
 from foosim.world.clearance.hall_obstacles import obstacles_of, start_findings
+from foosim.world.components.base import Kit
 from foosim.world.forms.registry import kit
 from foosim.world.parameters.hall import HALL, Hall, hall_findings
 from foosim.world.scene import Shape
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @kit(HALL, Hall)
-class HallKit:
+class HallKit(Kit):
     """A hall with walls, in which rovers drive and stations charge them."""
 
     def __init__(self, section: Hall, spec: WorldSpec) -> None:

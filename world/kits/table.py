@@ -7,6 +7,7 @@ from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
+from foosim.world.components.base import Kit
 from foosim.world.forms.registry import kit
 from foosim.world.matter.physics import DEFAULT, Contact, Physics, Side
 from foosim.world.parameters.table import TABLE, Surface, Table
@@ -38,7 +39,7 @@ def _spares(section: Table) -> dict[str, str]:
     rules={"football": {"kind": "football"}},
     presets=PRESETS,
 )
-class TableKit:
+class TableKit(Kit):
     """A football table with its ball, which rods play by the rules of the game."""
 
     def __init__(self, section: Table, spec: WorldSpec) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from foosim.common.errors import BadValue
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS
 from foosim.world.forms.registry import model
@@ -27,7 +28,7 @@ ORANGE: Final[Colour] = (1.0, 0.5, 0.0, 1.0)
     couples=False,
     kit="table",
 )
-class Ball:
+class Ball(Model):
     """A ball: a solid sphere, I = 2/5 m r^2."""
 
     def __init__(self, settings: None, at: Mounting) -> None:
@@ -73,7 +74,7 @@ class Ball:
             valid = f"valid are x up to {x:g} m and y up to {y:g} m from the middle, z above 0 m up to {z:g} m"
             raise BadValue(f"a place outside of the table: {valid}", ", ".join(f"{value:g} m" for value in position))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Kick it, for the small run that tells engines apart."""
         view.write(self._at.slot("linear_velocity"), 1.0, 0.3, 0.0)
 

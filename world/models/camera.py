@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
@@ -14,7 +15,7 @@ class CameraRobot(RobotSettings):
 
 
 @model("camera", CameraRobot, slots={"down": 1, "refused": 1}, has_body=False, kit="table")
-class Camera:
+class Camera(Model):
     """A camera: sensors without a body."""
 
     def __init__(self, settings: CameraRobot, at: Mounting) -> None:

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final
+
+import numpy as np
 
 from foosim.common.exact_math import atan2
+from foosim.world.components.base import Model, Motion
+from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, Slot, WritableView
 from foosim.world.forms.forms import BODY, JOINTS
 from foosim.world.forms.registry import model
+from foosim.world.layout import Entity
+from foosim.world.moving.arcs import Arcs, Floats, along_arcs, approached
+from foosim.world.moving.asked import asked_of
+from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
-from foosim.world.moving.wheels import WheelMotors, Wheels, slips_of
+from foosim.world.moving.wheels import WheelMotors, Wheels, slips_of, wheels_of
 from foosim.world.parameters.differential import DifferentialDriveRobot, rigid_body
 from foosim.world.parameters.primitives import RIGID
 from foosim.world.parameters.vehicles import body_of, is_in_reach, set_down, upright
@@ -22,7 +31,101 @@ WHEELS: Final = {"heading": 1, "wheel_speeds": 2, "wheel_travel": 2}
 """The heading of a robot, the speeds of its rims, and how far its wheels have turned."""
 
 
-class RigidDifferentialDrive:
+STATE: Final = (
+    "position",
+    "orientation",
+    "linear_velocity",
+    "angular_velocity",
+    "heading",
+    "wheel_speeds",
+    "wheel_travel",
+    "blocked",
+)
+"""The fields that this motion writes."""
+STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0))
+
+
+class _Batch:
+    """Robots that one node moves in a tick."""
+
+    def __init__(
+        self, way: FreeWay, state: EntityColumns, wheels: Mapping[int, Wheels], entities: Sequence[Entity]
+    ) -> None:
+        """`wheels` are by the entities' indices."""
+        self.entities = list(entities)
+        self.state = state.of(entities)
+        self.movers = way.movers(entities, is_level=True)
+        its = [wheels[entity.index] for entity in entities]
+        self.track = np.array([one.track for one in its])
+        self.rolls = np.array([[1.0 - one.slips[0], 1.0 - one.slips[1]] for one in its])
+
+
+class WheeledMotion(Motion):
+    """Along arcs, as far as nothing is in the way.
+
+    A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
+    From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a robot goes along an
+    arc (`moving.arcs`), as far as nothing is in the way (`moving.free_way`). It turns on the spot where all is
+    blocked, with its wheels slipping.
+    """
+
+    takes_arrays: ClassVar = True
+
+    def __init__(self, at: MotionMounting) -> None:
+        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
+        self._substeps = at.spec.substeps
+        self._way = FreeWay(at)
+        self._state = EntityColumns(at, STATE)
+        self._wheels = {entity.index: wheels_of(at.spec, at.layout, entity) for entity in at.entities}
+        self._batch = self._batch_of(at.entities)
+
+    def _batch_of(self, entities: Sequence[Entity]) -> _Batch:
+        return _Batch(self._way, self._state, self._wheels, entities)
+
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors] | Floats, view: WritableView) -> None:
+        """Advance these robots by a tick; of each wheel the target speed (m/s) and greatest acceleration (m/s2)."""
+        if self._batch.entities != entities:
+            self._batch = self._batch_of(entities)
+        batch, dt, count = self._batch, self._dt, len(entities)
+        state = batch.state.read_at_start(view)
+        place, heading = state[:, 0:3].copy(), state[:, 13].copy()
+        speeds, travel = state[:, 14:16].copy(), state[:, 16:18].copy()
+        asked = asked_of(motors, STANDING)
+        targets, rates = asked[:, :, 0], asked[:, :, 1]
+        near = self._way.near(batch.movers, view)
+        is_stopped = np.zeros(count, bool)
+        for _ in range(self._substeps):
+            speeds = approached(speeds, targets, rates * dt)
+            travel = travel + speeds * dt
+            ground = speeds * batch.rolls
+            ahead, turned = (ground[:, 0] + ground[:, 1]) / 2.0, (ground[:, 1] - ground[:, 0]) / batch.track * dt
+            ways = np.zeros((count, 3))
+            arcs = along_arcs(ahead * dt, 0.0, turned, heading)
+            ways[:, 0], ways[:, 1], heading = arcs.x, arcs.y, arcs.heading
+            place, shares, stops = near.free_way(place, ways)
+            is_stopped |= stops
+        _write(batch, view, place, arcs, ahead * shares, turned / dt, (speeds, travel, is_stopped))
+
+
+def _write(
+    batch: _Batch,
+    view: WritableView,
+    place: Floats,
+    arcs: Arcs,
+    ahead: Floats,
+    turn_rate: Floats,
+    rest: tuple[Floats, Floats, Floats],
+) -> None:
+    state = np.zeros((len(place), batch.state.width))
+    z, w = arcs.turn_z, arcs.turn_w
+    state[:, 0:3], state[:, 5], state[:, 6] = place, z, w
+    state[:, 7], state[:, 8] = ahead * (1.0 - 2.0 * z * z), ahead * (2.0 * z * w)
+    state[:, 12], state[:, 13] = turn_rate, arcs.heading
+    state[:, 14:16], state[:, 16:18], state[:, 18] = rest
+    batch.state.write(view, state)
+
+
+class RigidDifferentialDrive(Model):
     """A round robot on two driven wheels, as a rigid body that stands on the floor.
 
     `wheel_speeds` are rim speeds, `wheel_travel` is how far the wheels have turned at the rim, also where they slip.
@@ -71,20 +174,20 @@ class RigidDifferentialDrive:
     "differential_drive",
     DifferentialDriveRobot,
     slots={**BODY, **WHEELS, "blocked": 1},
-    motion="differential_drive",
+    motion=WheeledMotion,
     actuators={"motion": {"kind": "v_w"}},
     tags=("vehicle",),
     units={"heading": ("rad",), "wheel_speeds": ("m/s",), "wheel_travel": ("m",)},
     variants={
         "rigid": {
-            "made": RigidDifferentialDrive,
+            "factory": RigidDifferentialDrive,
             "slots": {**RIGID, **dict.fromkeys(JOINTS, 2), **WHEELS},
             "is_rigid": True,
-            "motion": "",
+            "motion": None,
         }
     },
 )
-class DifferentialDrive:
+class DifferentialDrive(Model):
     """A round robot on two driven wheels.
 
     `wheel_speeds` are rim speeds, `wheel_travel` is how far the wheels have turned, `blocked` whether an obstacle

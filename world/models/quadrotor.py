@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.matter.materials import PLASTIC
@@ -23,7 +24,7 @@ RED: Final[Colour] = (0.80, 0.20, 0.15, 1.0)
     actuators={"rotors": {"kind": "rotor_speeds"}},
     tags=("flying",),
 )
-class Quadrotor:
+class Quadrotor(Model):
     """A frame with four discs, x ahead, z up: a rigid body."""
 
     def __init__(self, settings: QuadrotorRobot, at: Mounting) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import sqrt
 from typing import Final
 
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import CONTACTS, JOINTS, TOUCHES
 from foosim.world.forms.registry import model
@@ -59,7 +60,7 @@ def line_x_m(spec: WorldSpec, robot: RodRobot) -> float:
     actuators={"position": {"kind": "rod_position"}},
     units={"joint_positions": ("m", "rad"), "joint_velocities": ("m/s", "rad/s"), "joint_efforts": ("N", "N m")},
 )
-class Rod:
+class Rod(Model):
     """A rod: a carriage that slides along world +y, and on it what turns about +y; at 0 the feet hang straight down."""
 
     def __init__(self, settings: RodRobot, at: Mounting) -> None:

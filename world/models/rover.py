@@ -9,10 +9,12 @@ from typing import Annotated, Final
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
 from foosim.world.matter.materials import METAL, PLASTIC
+from foosim.world.models.differential_drive import WheeledMotion
 from foosim.world.moving.upright import Upright
 from foosim.world.moving.wheels import Wheels, slips_of
 from foosim.world.parameters.hall import Place, hall_of
@@ -54,14 +56,14 @@ class RoverRobot(RobotSettings):
         "charge": 1,
         "refused": 1,
     },
-    motion="differential_drive",
+    motion=WheeledMotion,
     kit="hall",
     actuators={"drive": {"kind": "wheel_speeds"}},
     rules={"battery": {"kind": "battery"}},
     tags=("vehicle",),
     units={"heading": ("rad",), "wheel_speeds": ("m/s",), "wheel_travel": ("m",), "charge": ("J",)},
 )
-class Rover:
+class Rover(Model):
     """A round robot on two wheels, with a battery.
 
     `wheel_speeds` are rim speeds, `wheel_travel` is how far the wheels have turned, `blocked` whether an obstacle

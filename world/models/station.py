@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import RobotSettings
@@ -24,7 +25,7 @@ class StationRobot(RobotSettings):
 
 
 @model("station", StationRobot, slots={"down": 1, "refused": 1}, kit="hall")
-class Station:
+class Station(Model):
     """A base station: a round hull with an antenna."""
 
     def __init__(self, settings: StationRobot, at: Mounting) -> None:

@@ -13,6 +13,7 @@ from foosim.common.errors import BadValue
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.bodies.urdf import Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
 from foosim.world.forms.registry import model
@@ -81,7 +82,7 @@ def _slots(settings: UrdfRobot, spec: WorldSpec) -> dict[str, int]:
 
 
 @model("urdf", UrdfRobot, slots=_slots, is_rigid=True)
-class Urdf:
+class Urdf(Model):
     """A robot from a URDF file; its joints start at 0, or at the limit that is nearest to it."""
 
     def __init__(self, settings: UrdfRobot, at: Mounting) -> None:
@@ -112,7 +113,7 @@ class Urdf:
             view.write(at.slot("joint_positions"), *[_start(link) for link in body.joints])
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Set it in motion, for the small run that tells engines apart."""
         if self._body.is_free:
             view.write(self._at.slot("linear_velocity"), 0.5, 0.2, 0.0)

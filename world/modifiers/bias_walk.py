@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, WritableView
 from foosim.world.forms.per_field import PerField
 from foosim.world.forms.registry import modifier
@@ -33,7 +34,7 @@ class BiasWalkSettings(ModifierSettings):
     per_field={"initial": 0.0, "walk": 0.0},
     slots=lambda settings, about: {"offset": about.size},
 )
-class BiasWalk:
+class BiasWalk(Modifier):
     """Adds an offset that walks to each number; what it has walked is in the frame."""
 
     def __init__(self, settings: BiasWalkSettings, at: ModifierMounting) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from foosim.common.errors import BadValue
+from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
 from foosim.world.forms.per_field import Numbers, PerField, read_per_field
 from foosim.world.forms.registry import modifier
@@ -19,7 +20,7 @@ class ClipSettings(ModifierSettings):
 
 
 @modifier("clip", ClipSettings, per_field={"low": None, "high": None})
-class Clip:
+class Clip(Modifier):
     """Holds each number within a range."""
 
     def __init__(self, settings: ClipSettings, at: ModifierMounting) -> None:

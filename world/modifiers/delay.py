@@ -10,6 +10,7 @@ from pydantic import Field
 from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.units import Quantity
+from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, WritableView
 from foosim.world.forms.forms import Carrier
 from foosim.world.forms.registry import modifier
@@ -47,7 +48,7 @@ def slots(settings: DelaySettings, of: Carrier) -> dict[str, int]:
 
 
 @modifier("delay", DelaySettings, slots=slots)
-class DelayLine:
+class DelayLine(Modifier):
     """Keeps values, the oldest first, until they are old enough."""
 
     def __init__(self, settings: DelaySettings, at: ModifierMounting) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from foosim.common import units
 from foosim.common.units import Quantity
+from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
 from foosim.world.forms.registry import modifier
 from foosim.world.forms.settings import ModifierSettings
@@ -20,7 +21,7 @@ class DropOutSettings(ModifierSettings):
 
 
 @modifier("drop_out", DropOutSettings)
-class DropOut:
+class DropOut(Modifier):
     """Drops some values."""
 
     def __init__(self, settings: DropOutSettings, at: ModifierMounting) -> None:

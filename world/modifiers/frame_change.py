@@ -13,6 +13,7 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
 from foosim.world.forms.per_field import Numbers
 from foosim.world.forms.registry import modifier
@@ -36,7 +37,7 @@ class FrameChangeSettings(ModifierSettings):
 
 
 @modifier("frame_change", FrameChangeSettings)
-class FrameChange:
+class FrameChange(Modifier):
     """Gives positions, directions, headings and orientations in another frame."""
 
     def __init__(self, settings: FrameChangeSettings, at: ModifierMounting) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from foosim.world.components.base import Modifier
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import ModifierMounting, View
 from foosim.world.forms.per_field import PerField
@@ -27,7 +28,7 @@ class GaussianNoiseSettings(ModifierSettings):
 
 
 @modifier("gaussian_noise", GaussianNoiseSettings, per_field={"std": 0.0})
-class GaussianNoise:
+class GaussianNoise(Modifier):
     """Adds a normal draw to each number."""
 
     def __init__(self, settings: GaussianNoiseSettings, at: ModifierMounting) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import floor
 
+from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
 from foosim.world.forms.per_field import PerField
 from foosim.world.forms.registry import modifier
@@ -17,7 +18,7 @@ class QuantiseSettings(ModifierSettings):
 
 
 @modifier("quantise", QuantiseSettings, per_field={"step": 0.0})
-class Quantise:
+class Quantise(Modifier):
     """Rounds each number to a multiple of a step."""
 
     def __init__(self, settings: QuantiseSettings, at: ModifierMounting) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.world.components.entities import MotionMounting
-from foosim.world.components.view import Slot, SolvingView, WritableView
+from foosim.world.components.view import Slot, WritableView
 from foosim.world.layout import Entity
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -58,7 +58,7 @@ class Columns:
             self._numbers = itemgetter(*places, places[0])
         return np.array(self._numbers(numbers)[:-1]).reshape(self._count, self.width)
 
-    def read_at_start(self, view: SolvingView) -> Floats:
+    def read_at_start(self, view: WritableView) -> Floats:
         """Return the numbers that they have at the start of the tick, of shape (entities, numbers)."""
         found: Floats = view.values[self._places]
         return found

@@ -11,6 +11,7 @@ from math import sqrt
 from typing import Any
 
 from foosim.world.components.entities import mounting_of
+from foosim.world.forms.forms import overrides
 from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity, Layout
 from foosim.world.scene import Body, Capsule, Cylinder, Sphere, shape_box
@@ -28,26 +29,29 @@ class Upright:
 
 def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
     """Return an entity as its model."""
-    return entity.kind.made(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
+    return entity.kind.factory(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
 
 
 def stands_upright(settings: EntitySettings) -> bool:
     """Whether robots with these settings move by kinematics and say what their cylinder is, and are no kit's."""
     model = settings.component_type
     return (
-        bool(model.motion) and not model.kit and hasattr(model.made, "upright") and "position" in (model.declared or ())
+        model.motion is not None
+        and not model.kit
+        and overrides(model.factory, "upright")
+        and "position" in (model.declared or ())
     )
 
 
 def is_upright(model: Any) -> bool:
     """Whether a model that moves is a cylinder to obstacles; one whose `is_upright` is False is what its shapes are."""
-    return bool(getattr(model, "is_upright", True))
+    return bool(model.is_upright)
 
 
 def upright_of(model: Any) -> Upright:
     """Return the cylinder of a model of an entity that has a body."""
-    if hasattr(model, "upright"):
-        found: Upright = model.upright()
+    found: Upright | None = model.upright()
+    if found is not None:
         return found
     body = model.body()
     assert body is not None, "what has no body meets nothing"

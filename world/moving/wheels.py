@@ -61,9 +61,9 @@ class Wheels:
 def wheels_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Wheels:
     """Return the wheels of an entity. Raises BadValue where its model does not say what they are."""
     model: Any = made_model(spec, layout, entity)
-    if not hasattr(model, "wheels"):
+    found: Wheels | None = model.wheels()
+    if found is None:
         raise BadValue("a model with wheel_speeds, and without a method wheels that says what they are", entity.model)
-    found: Wheels = model.wheels()
     return found
 
 

@@ -71,7 +71,7 @@ class JointGroup:
     """The joints that an actuator drives, in the frames of one layout."""
 
     def __init__(self, settings: JointSettings, at: Mounting) -> None:
-        """Raises Misfit for a joint that the robot does not have."""
+        """Raises IncompatibleComponent for a joint that the robot does not have."""
         body = body_at(at)
         everything = range(len(body.joints))
         self.indices = tuple(everything) if settings.joints is None else joint_indices(at, settings.joints)

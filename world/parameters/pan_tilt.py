@@ -9,7 +9,7 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.world.components.mounted import body_at
-from foosim.world.components.view import Misfit, Mounting
+from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.forms.forms import Carrier
 from foosim.world.moving.progress import SLOTS, Patience
 from foosim.world.parameters.joints import JointGroup, JointLoopSettings, loop_points
@@ -34,15 +34,15 @@ def pan_tilt_slots(settings: PanTiltSettings, carrier: Carrier) -> Mapping[str, 
 
 
 def pan_tilt_of(settings: PanTiltSettings, at: Mounting) -> JointGroup:
-    """Return the two joints. Raises Misfit for others."""
+    """Return the two joints. Raises IncompatibleComponent for others."""
     group, body = JointGroup(settings, at), body_at(at)
     path = "kind" if settings.joints is None else "joints"
     names = [link.name.removeprefix(f"{body.name}/") for link in group.links]
     if [link.joint in ("revolute", "continuous") for link in group.links] != [True, True]:
-        raise Misfit((path,), "two joints that turn are valid, pan and tilt", names)
+        raise IncompatibleComponent((path,), "two joints that turn are valid, pan and tilt", names)
     pan, tilt = (body.links.index(link) for link in group.links)
     if not hangs_on(body, tilt, pan):
-        raise Misfit((path,), "the second one hangs on the first: pan, then tilt", names)
+        raise IncompatibleComponent((path,), "the second one hangs on the first: pan, then tilt", names)
     return group
 
 

@@ -11,6 +11,7 @@ from foosim.common import units
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
 from foosim.world.bodies.inertia import principal_of, solid
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS, PARTNERS, RESTING
 from foosim.world.forms.settings import EntitySettings
@@ -52,7 +53,7 @@ class ObjectSettings(EntitySettings):
         return {"surface": self.surface}
 
 
-class RigidObject:
+class RigidObject(Model):
     """An entity of one shape and a uniform density, in the frames of one layout."""
 
     def __init__(self, settings: ObjectSettings, at: Mounting, geometry: Geometry) -> None:
@@ -77,7 +78,7 @@ class RigidObject:
         view.write(at.slot("orientation"), *multiply(pose.orientation, self._axes))
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Push and turn it, for the small run that tells engines apart."""
         view.write(self._at.slot("linear_velocity"), 0.3, 0.2, 0.1)
         view.write(self._at.slot("angular_velocity"), 0.5, -0.3, 1.0)

@@ -14,6 +14,7 @@ from typing import Annotated, ClassVar, Protocol
 from foosim.common import units
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Actuator
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.upright import made_model
@@ -104,13 +105,13 @@ class RodCommand(Protocol):
     def spin(self) -> float: ...
 
 
-class RodSetPoint:
+class RodSetPoint(Actuator):
     """What the last command asked of a rod's motors, in the slot `set_point`: two numbers, each within its bounds."""
 
     steady: ClassVar = True
     """What it asks follows from the state of its rod alone."""
-    stirs: ClassVar = (0.1, 0.5)
-    """Shares of the bounds that `stir` asks for."""
+    excites: ClassVar = (0.1, 0.5)
+    """Shares of the bounds that `excite` asks for."""
 
     def __init__(self, at: Mounting, bounds: tuple[float, float]) -> None:
         """`bounds` are the greatest numbers of slide and spin in either direction, in the units of the command."""
@@ -130,6 +131,6 @@ class RodSetPoint:
         """Ask for nothing: a speed of 0, no force, or motors that are shorted, which brakes them."""
         view.write(self._set_point, 0.0, 0.0)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Slide and turn, for the small run that tells engines apart."""
-        view.write(self._set_point, *[share * most for share, most in zip(self.stirs, self._bounds, strict=True)])
+        view.write(self._set_point, *[share * most for share, most in zip(self.excites, self._bounds, strict=True)])

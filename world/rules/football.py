@@ -6,9 +6,10 @@ They edit frame k before it is solved, in every node alike, with all their memor
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.world.components.base import Rule
 from foosim.world.components.entities import Marked, MarkKind, RuleMounting, mounting_of
 from foosim.world.components.view import View, WritableView
 from foosim.world.forms.forms import ENTITY, NO_ENTITY
@@ -52,10 +53,10 @@ def kickoff_ticks(spec: WorldSpec) -> int:
     writes=("ball",),
     kit="table",
 )
-class Football:
+class Football(Rule):
     """Goal and own goal, kick-off, dead ball, ball off the table, clock and end of a match."""
 
-    mark_kinds: Final = {
+    mark_kinds: ClassVar = {
         GOAL: MarkKind("score", "goals", is_cut=True),
         OWN_GOAL: MarkKind("score", "own goals", is_cut=True),
         KICKOFF: MarkKind("start", "kick-offs", is_cut=True),

@@ -14,6 +14,7 @@ from typing import Annotated, Final, NamedTuple
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Rule
 from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import WritableView
 from foosim.world.forms.registry import rule
@@ -59,7 +60,7 @@ def air_of(spec: WorldSpec, layout: Layout) -> Air | None:
 
 
 @rule("wind", WindSettings, slots=dict.fromkeys(AXES, 1), settable=dict.fromkeys(AXES, AIR_SPEED))
-class Wind:
+class Wind(Rule):
     """How fast the air goes (m/s), the same everywhere."""
 
     def __init__(self, settings: WindSettings, at: RuleMounting) -> None:

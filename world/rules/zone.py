@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import model_validator
 
@@ -11,6 +11,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.units import Quantity, custom_error
+from foosim.world.components.base import Rule
 from foosim.world.components.entities import Marked, MarkKind, RuleMounting
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import View, WritableView
@@ -53,13 +54,13 @@ class ZoneSettings(RuleSettings):
 
 
 @rule("zone", ZoneSettings, slots={"count": 1, "all_in": 1, "since": 1})
-class Zone:
+class Zone(Rule):
     """How many are in a zone (`count`), and whether all of them are, which are at least one (`all_in`).
 
     `since` is the tick from which on all were in it, for the last time.
     """
 
-    mark_kinds: Final = {FULL: MarkKind("score", "zones with all in them")}
+    mark_kinds: ClassVar = {FULL: MarkKind("score", "zones with all in them")}
 
     def __init__(self, settings: ZoneSettings, at: RuleMounting) -> None:
         self._name = at.name

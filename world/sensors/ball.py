@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
@@ -27,7 +28,7 @@ class BallPosition(Struct, frozen=True):
 
 
 @sensor("ball", BallSettings, BallPosition, kit="table")
-class BallTracker:
+class BallTracker(Sensor):
     """The ball's position in the world frame."""
 
     def __init__(self, settings: BallSettings, at: Mounting) -> None:

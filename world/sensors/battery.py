@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.base import Sensor
+from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.energy.battery import batteries_of, cell_of, is_rover
 from foosim.world.forms.quantities import Share, Volts
 from foosim.world.forms.registry import sensor
@@ -23,7 +24,7 @@ class Battery(Struct, frozen=True):
 
 
 @sensor("battery", BatterySettings, Battery)
-class BatteryGauge:
+class BatteryGauge(Sensor):
     """Charge of a battery as a share of its capacity, and its voltage, which falls evenly with the charge."""
 
     def __init__(self, settings: BatterySettings, at: Mounting) -> None:
@@ -35,9 +36,11 @@ class BatteryGauge:
 
     @staticmethod
     def check(settings: BatterySettings, at: Mounting) -> None:
-        """Raise Misfit on a robot without a battery."""
+        """Raise IncompatibleComponent on a robot without a battery."""
         if not (is_rover(at.spec, at.robot) or batteries_of(at.spec, at.robot)):
-            raise Misfit(("kind",), f"on a robot without a battery: {at.robot.name} has no rule battery", settings.kind)
+            raise IncompatibleComponent(
+                ("kind",), f"on a robot without a battery: {at.robot.name} has no rule battery", settings.kind
+            )
 
     def sample(self, view: View) -> Battery:
         share = view.numbers[self._charge] / self._capacity_j

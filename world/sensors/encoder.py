@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Metres, Radians
 from foosim.world.forms.registry import sensor
@@ -24,7 +25,7 @@ class RodPosition(Struct, frozen=True):
 
 
 @sensor("encoder", EncoderSettings, RodPosition, needs=("joint_positions",))
-class Encoder:
+class Encoder(Sensor):
     """Slide and spin of a rod."""
 
     def __init__(self, settings: EncoderSettings, at: Mounting) -> None:

@@ -7,8 +7,9 @@ from typing import ClassVar, Final
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.earth import Geodesy
 from foosim.world.forms.quantities import Degrees, Metres
 from foosim.world.forms.registry import sensor
@@ -38,7 +39,7 @@ class GlobalPosition(Struct, frozen=True):
 
 
 @sensor("gps", GpsSettings, GlobalPosition, shown_as="foxglove.LocationFix")
-class Gps:
+class Gps(Sensor):
     """Latitude, longitude and altitude of the mount."""
 
     def __init__(self, settings: GpsSettings, at: Mounting) -> None:
@@ -48,10 +49,11 @@ class Gps:
 
     @staticmethod
     def check(settings: GpsSettings, at: Mounting) -> None:
-        """Raise Misfit in a world without an origin on Earth, and for a link that the robot does not have."""
+        """Raise IncompatibleComponent in a world without an origin on Earth, and for a link that the robot does not
+        have."""
         if at.spec.origin is None:
             what = "in a world that is nowhere on Earth: the deployment needs origin: {latitude: ..., longitude: ...}"
-            raise Misfit(("kind",), what, settings.kind)
+            raise IncompatibleComponent(("kind",), what, settings.kind)
         Mounted(at, settings.at)
 
     def sample(self, view: View) -> GlobalPosition:

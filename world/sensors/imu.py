@@ -15,6 +15,7 @@ from typing import ClassVar
 from msgspec import Struct
 
 from foosim.world.assembly.sections import gravity_of
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.quantities import MetresPerSecondSquared, RadiansPerSecond
@@ -47,7 +48,7 @@ class Inertial(Struct, frozen=True):
 
 
 @sensor("imu", ImuSettings, Inertial, slots={"velocity": 3, "measured": 1})
-class Imu:
+class Imu(Sensor):
     """Specific force and angular rate at the mount, in its axes.
 
     `velocity` is that of the mount at the reading before (m/s, world frame), `measured` the tick of that one counted
@@ -62,7 +63,8 @@ class Imu:
 
     @staticmethod
     def check(settings: ImuSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that the robot does not have, or a robot whose places move nobody knows how."""
+        """Raise IncompatibleComponent for a link that the robot does not have, or a robot whose places move nobody
+        knows how."""
         Mounted(at, settings.at).check_twist()
 
     def sample(self, view: WritableView) -> Inertial:

@@ -6,7 +6,8 @@ from msgspec import Struct
 
 from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import Name
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.base import Sensor
+from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.forms.jobs import CHANGED, FAILURE, NUMBERS, RUNNING, STATES
 from foosim.world.forms.quantities import Count
 from foosim.world.forms.registry import sensor
@@ -33,8 +34,8 @@ class Jobs(Struct, frozen=True):
     states: tuple[Count, ...]
 
 
-@sensor("job", JobSettings, Jobs, speaks=lambda settings: f"{settings.actuator}.{CHANGED}")
-class JobSensor:
+@sensor("job", JobSettings, Jobs, trigger=lambda settings: f"{settings.actuator}.{CHANGED}")
+class JobSensor(Sensor):
     """Whose job an actuator does, and the last job of each sender, with how it stands."""
 
     def __init__(self, settings: JobSettings, at: Mounting) -> None:
@@ -46,12 +47,12 @@ class JobSensor:
 
     @staticmethod
     def check(settings: JobSettings, at: Mounting) -> None:
-        """Raise Misfit for an actuator that the robot does not have, or that does no jobs."""
+        """Raise IncompatibleComponent for an actuator that the robot does not have, or that does no jobs."""
         name, offsets = settings.actuator, at.robot.offsets
         having = [one for one in at.spec.robots[at.robot.name].actuators if f"{one}.{CHANGED}" in offsets]
         if name not in having:
             what = f"{at.robot.name} has no such actuator with jobs; there are {', '.join(having) or 'none'}"
-            raise Misfit(("actuator",), what, name, nearest_quoted(name, having))
+            raise IncompatibleComponent(("actuator",), what, name, nearest_quoted(name, having))
 
     def sample(self, view: View) -> Jobs:
         failure = 0.0 if self._failure is None else view.numbers[self._failure.at]

@@ -9,6 +9,7 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import Name
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.forms import JOINTS
@@ -44,8 +45,8 @@ def joints_of(settings: JointStateSettings, counts: Mapping[str, int]) -> int:
     return len(settings.joints) or counts["joint_positions"]
 
 
-@sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, several=joints_of)
-class JointStates:
+@sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, array_length=joints_of)
+class JointStates(Sensor):
     """Positions, velocities and efforts of joints."""
 
     def __init__(self, settings: JointStateSettings, at: Mounting) -> None:
@@ -55,7 +56,7 @@ class JointStates:
 
     @staticmethod
     def check(settings: JointStateSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have, or that is named twice."""
+        """Raise IncompatibleComponent for a joint that the robot does not have, or that is named twice."""
         if settings.joints:
             joint_indices(at, settings.joints)
 

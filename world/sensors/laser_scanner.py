@@ -14,6 +14,7 @@ from foosim.common import units
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Sensor
 from foosim.world.components.beams import Beams, BeamsTogether
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import Mounting, View
@@ -60,8 +61,8 @@ class Scan(Struct, frozen=True):
     distances: Annotated[tuple[Metres, ...], Meta(min_length=1, max_length=RAYS_MAX)]
 
 
-@sensor("laser_scanner", LaserScannerSettings, Scan, several="rays", shown_as="foxglove.LaserScan")
-class LaserScanner:
+@sensor("laser_scanner", LaserScannerSettings, Scan, array_length="rays", shown_as="foxglove.LaserScan")
+class LaserScanner(Sensor):
     """The distance to what each beam meets, the robot's own body aside; the range where that is nothing."""
 
     def __init__(self, settings: LaserScannerSettings, at: Mounting) -> None:

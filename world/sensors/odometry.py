@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Metres
 from foosim.world.forms.registry import sensor
@@ -27,7 +28,7 @@ class WheelTravel(Struct, frozen=True):
 
 
 @sensor("odometry", OdometrySettings, WheelTravel, needs=("wheel_travel",))
-class Odometry:
+class Odometry(Sensor):
     """Travel of the left and the right wheel's rim since the start."""
 
     def __init__(self, settings: OdometrySettings, at: Mounting) -> None:

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Metres, Radians
 from foosim.world.forms.registry import sensor
@@ -28,7 +29,7 @@ class Pose(Struct, frozen=True):
 
 
 @sensor("pose", PoseSettings, Pose, needs=("position", "heading"), shown_as="foxglove.PoseInFrame")
-class PoseTracker:
+class PoseTracker(Sensor):
     """Place and heading in the world frame."""
 
     def __init__(self, settings: PoseSettings, at: Mounting) -> None:

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres, QuaternionPart
@@ -35,7 +36,7 @@ class Pose3d(Struct, frozen=True):
 
 
 @sensor("pose_3d", Pose3dSettings, Pose3d, shown_as="foxglove.PoseInFrame")
-class PoseTracker3d:
+class PoseTracker3d(Sensor):
     """Position and orientation of the mount in the world frame."""
 
     def __init__(self, settings: Pose3dSettings, at: Mounting) -> None:
@@ -43,7 +44,7 @@ class PoseTracker3d:
 
     @staticmethod
     def check(settings: Pose3dSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that the robot does not have."""
+        """Raise IncompatibleComponent for a link that the robot does not have."""
         Mounted(at, settings.at)
 
     def sample(self, view: View) -> Pose3d:

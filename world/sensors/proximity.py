@@ -17,6 +17,7 @@ from pydantic import Field
 from foosim.common import units
 from foosim.common.exact_math import cos, sin
 from foosim.common.units import Quantity
+from foosim.world.components.base import Sensor
 from foosim.world.components.beams import Beams, BeamsTogether, body_of, hull_middle, mounted_at, way_out
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import Mounting, View
@@ -45,8 +46,8 @@ class Ranges(Struct, frozen=True):
     ways: Annotated[tuple[Metres, ...], Meta(min_length=1, max_length=RAYS_MAX)]
 
 
-@sensor("proximity", ProximitySettings, Ranges, several="rays")
-class Proximity:
+@sensor("proximity", ProximitySettings, Ranges, array_length="rays")
+class Proximity(Sensor):
     """The free way from the hull along each ray; the sensor's range where nothing is hit."""
 
     def __init__(self, settings: ProximitySettings, at: Mounting) -> None:

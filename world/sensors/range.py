@@ -13,6 +13,7 @@ from foosim.common import units
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Sensor
 from foosim.world.components.beams import Beams, BeamsTogether
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres
@@ -49,7 +50,7 @@ class Distance(Struct, frozen=True):
 
 
 @sensor("range", RangeSettings, Distance)
-class RangeFinder:
+class RangeFinder(Sensor):
     """The distance to the nearest that one beam, or a cone of 13, meets, the robot's own body aside."""
 
     def __init__(self, settings: RangeSettings, at: Mounting) -> None:

@@ -15,6 +15,7 @@ from msgspec import Struct
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.components.base import Sensor
 from foosim.world.components.fires import Fires
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View
@@ -45,7 +46,7 @@ class Temperature(Struct, frozen=True):
 
 
 @sensor("thermometer", ThermometerSettings, Temperature)
-class Thermometer:
+class Thermometer(Sensor):
     """The temperature at the mount, by the distance from all fires that burn."""
 
     def __init__(self, settings: ThermometerSettings, at: Mounting) -> None:
@@ -54,7 +55,7 @@ class Thermometer:
 
     @staticmethod
     def check(settings: ThermometerSettings, at: Mounting) -> None:
-        """Raise Misfit for a link that the robot does not have."""
+        """Raise IncompatibleComponent for a link that the robot does not have."""
         Mounted(at, settings.at)
 
     def sample(self, view: View) -> Temperature:

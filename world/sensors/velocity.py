@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import MetresPerSecond
@@ -38,7 +39,7 @@ class Velocity(Struct, frozen=True):
 
 
 @sensor("velocity", VelocitySettings, Velocity, needs=("position", "orientation", "linear_velocity"))
-class VelocitySensor:
+class VelocitySensor(Sensor):
     """Velocity and turn rate of the mount: as it moves over the ground, with what the wheels slip."""
 
     def __init__(self, settings: VelocitySettings, at: Mounting) -> None:

@@ -9,9 +9,10 @@ import numpy as np
 
 from foosim.world.assembly.world import models_of
 from foosim.world.clearance.overlaps import overlapped
-from foosim.world.clearance.solids import distance, scenery_of, solid, solids
+from foosim.world.forms.forms import overrides
 from foosim.world.layout import Entity, Layout
-from foosim.world.moving.upright import Upright
+from foosim.world.moving.solids import distance, scenery_of, solid, solids
+from foosim.world.moving.upright import Upright, upright_of
 from foosim.world.spec import WorldSpec
 
 
@@ -53,9 +54,9 @@ class _Standing:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self.uprights: dict[int, Upright] = {
-            index: model.upright()
+            index: upright_of(model)
             for index, model in models_of(spec, layout).items()
-            if hasattr(model, "upright") and "position" in layout.entities[index].offsets
+            if overrides(type(model), "upright") and "position" in layout.entities[index].offsets
         }
         self.shapes = list(scenery_of(spec))
         self.rows = solids([solid(shape) for shape in self.shapes])

@@ -21,8 +21,8 @@ from foosim.world.assembly.world import body_of, entity_rules_of, model_of, rule
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Set, write, written
-from foosim.world.forms.failures import WrongResult
-from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY
+from foosim.world.forms.failures import ContractError
+from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY, overrides
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import (
     WORLD,
@@ -95,7 +95,7 @@ def _is_placed(spec: WorldSpec, entity: Entity) -> bool:
     if "position" not in entity.fields:
         return False
     settings = spec.settings_of(entity.name)
-    return hasattr(entity.kind.made, "place_at") if settings is None else is_placed(type(settings))
+    return overrides(entity.kind.factory, "place_at") if settings is None else is_placed(type(settings))
 
 
 def set_edits(
@@ -136,8 +136,6 @@ def set_edits(
         raise BadValue(f"no field of {entity.name} that can be set ({there})", field, nearest_name(field, fields))
     made, quantity = found[0]
     number = _number(quantity, value)
-    if not hasattr(made, "set"):
-        return [Set(entity.name, field, [number])]
     what = label or f"model {entity.model}"
     return called(what, entity.name, 0, _of_component, entity, label, made.set, name, number)
 
@@ -160,7 +158,7 @@ def _of_component(
     for slot, numbers in ask(name, number).items():
         field = _field(label, slot) if _field(label, slot) in entity.offsets else slot
         if entity.counts.get(field) != len(numbers) or not all(map(isfinite, numbers)):
-            raise WrongResult(ask, "finite numbers by slot, as many as each has,", {slot: numbers})
+            raise ContractError(ask, "finite numbers by slot, as many as each has", {slot: numbers})
         found.append(Set(entity.name, field, [*map(float, numbers)]))
     return found
 
@@ -197,10 +195,10 @@ def _place(spec: WorldSpec, layout: Layout, entity: Entity, pose: Pose, view: Wr
     """Write the state of an entity that starts with a pose. What has no settings is put by its model's `place_at`."""
     what, at = f"model {entity.model}", mounting_of(spec, layout, entity)
     if spec.settings_of(entity.name) is not None:
-        made: Any = called(what, entity.name, 0, entity.kind.made, _elsewhere(spec, entity, pose), at)
+        made: Any = called(what, entity.name, 0, entity.kind.factory, _elsewhere(spec, entity, pose), at)
         called(what, entity.name, 0, made.place, view)
         return
-    made = called(what, entity.name, 0, entity.kind.made, None, at)
+    made = called(what, entity.name, 0, entity.kind.factory, None, at)
     made.check_place(pose.position)
     called(what, entity.name, 0, made.place_at, view, pose.position)
 
@@ -231,8 +229,7 @@ def add_edit(
         for edit in _put(spec, layout, after, entity, place):
             write(layout, after, edit)
     for label, rule in entity_rules_of(spec, layout, entity) if entity.is_robot else ():
-        if hasattr(rule, "place"):
-            called(f"rule {label}", entity.name, 0, rule.place, view)
+        called(f"rule {label}", entity.name, 0, rule.place, view)
     if is_checked:
         check_place(spec, layout, after, entity)
     return Add(entity.name, after[start : entity.stop])
@@ -242,8 +239,7 @@ def check_place(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entit
     """Raise BadValue where an entity is in something in a frame of these numbers, or beyond the bounds of its model."""
     at = entity.offsets["position"]
     where = ", ".join(f"{number:g} m" for number in numbers[at : at + 3])
-    is_plausible = getattr(model_of(spec, layout, entity), "is_plausible", None)
-    if is_plausible is not None and not is_plausible(numbers, numbers):
+    if not model_of(spec, layout, entity).is_plausible(numbers, numbers):
         raise BadValue(f"a place beyond the bounds of the world: {entity.name} would be quarantined there", where)
     if what := occupied_by(spec, layout, numbers, entity):
         raise BadValue(f"a place that is occupied: {entity.name} would be in {what}", where)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
@@ -31,7 +32,7 @@ class JointPositions(Struct, frozen=True):
     needs=("joint_positions",),
     joints="joints",
 )
-class JointPositionActuator:
+class JointPositionActuator(Actuator):
     """A proportional loop: speed = gain x (set-point - position); the motor has at most the effort of the joint."""
 
     def __init__(self, settings: JointPositionSettings, at: Mounting) -> None:
@@ -40,7 +41,7 @@ class JointPositionActuator:
 
     @staticmethod
     def check(settings: JointPositionSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -64,7 +65,7 @@ class JointPositionActuator:
         """Make the present positions the set-points."""
         view.write(self._group.set_point, *self._group.positions(view))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Move each joint by a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
@@ -23,7 +24,7 @@ class JointEfforts(Struct, frozen=True):
 @actuator(
     "joint_torque", JointTorqueSettings, JointEfforts, slots=set_points, needs=("joint_positions",), joints="joints"
 )
-class JointTorqueActuator:
+class JointTorqueActuator(Actuator):
     """Motors that apply the last efforts that they were told, up to the greatest speeds of their joints."""
 
     def __init__(self, settings: JointTorqueSettings, at: Mounting) -> None:
@@ -31,7 +32,7 @@ class JointTorqueActuator:
 
     @staticmethod
     def check(settings: JointTorqueSettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -55,7 +56,7 @@ class JointTorqueActuator:
         """Let the joints go."""
         view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Push each joint a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[min(0.01, force) for force in self._group.forces])
 

@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import default
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.forms import Carrier
@@ -83,7 +84,7 @@ def _slots(settings: JointTrajectorySettings, carrier: Carrier) -> Mapping[str, 
     joints="joints",
     jobs=True,
 )
-class JointTrajectory:
+class JointTrajectory(Actuator):
     """Keeps the points of the last command, and the tick that it came in.
 
     `set_point` is where its way began; without points it is where the joints stay.
@@ -107,7 +108,7 @@ class JointTrajectory:
 
     @staticmethod
     def check(settings: JointTrajectorySettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -159,7 +160,7 @@ class JointTrajectory:
         view.write(self._count, 0.0)
         view.write(self._group.set_point, *self._group.positions(view))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Move each joint by a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.registry import actuator
@@ -28,7 +29,7 @@ class JointVelocities(Struct, frozen=True):
     needs=("joint_positions",),
     joints="joints",
 )
-class JointVelocityActuator:
+class JointVelocityActuator(Actuator):
     """Motors that keep the last speeds that they were told."""
 
     def __init__(self, settings: JointVelocitySettings, at: Mounting) -> None:
@@ -36,7 +37,7 @@ class JointVelocityActuator:
 
     @staticmethod
     def check(settings: JointVelocitySettings, at: Mounting) -> None:
-        """Raise Misfit for a joint that the robot does not have."""
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -60,7 +61,7 @@ class JointVelocityActuator:
         """Stop the joints."""
         view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn each joint a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[0.2] * self._group.set_point.size)
 

@@ -9,9 +9,10 @@ from typing import Final
 from msgspec import Struct
 
 from foosim.common.exact_math import atan2
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, link_index
-from foosim.world.components.view import Misfit, Mounting, View, WritableView
+from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.forms.forms import Carrier
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.quantities import JobNumber, Metres
@@ -50,7 +51,7 @@ def _slots(settings: LookAtSettings, carrier: Carrier) -> Mapping[str, int]:
 
 
 @actuator("look_at", LookAtSettings, Sight, slots=_slots, needs=("joint_positions",), joints="joints", jobs=True)
-class LookAt:
+class LookAt(Actuator):
     """Keeps the last place that it was told, and turns towards it.
 
     Pan turns by the angle about its axis between where it looks and the place, tilt by that between their heights. Both
@@ -68,10 +69,10 @@ class LookAt:
 
     @staticmethod
     def check(settings: LookAtSettings, at: Mounting) -> None:
-        """Raise Misfit for joints that are no pan and tilt, and a link that these do not turn."""
+        """Raise IncompatibleComponent for joints that are no pan and tilt, and a link that these do not turn."""
         its = LookAt(settings, at)
         if not hangs_on(its._body, its._eye, its._tilt):
-            raise Misfit(("at", "link"), "its joints do not turn this link", settings.at.link)
+            raise IncompatibleComponent(("at", "link"), "its joints do not turn this link", settings.at.link)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest of each coordinate (m)."""
@@ -90,7 +91,7 @@ class LookAt:
         view.write(self._group.set_point, *self._group.positions(view))
         self._progress.begin(view)
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn a little, for the small run that tells engines apart."""
         view.write(self._group.set_point, *[angle + 0.2 for angle in self._group.positions(view)])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.jobs import JobState
@@ -30,7 +31,7 @@ class PanTiltAngles(Struct, frozen=True):
     joints="joints",
     jobs=True,
 )
-class PanTilt:
+class PanTilt(Actuator):
     """Keeps the last angles that it was told: a proportional loop, as that of `joint_position`."""
 
     def __init__(self, settings: PanTiltSettings, at: Mounting) -> None:
@@ -39,7 +40,7 @@ class PanTilt:
 
     @staticmethod
     def check(settings: PanTiltSettings, at: Mounting) -> None:
-        """Raise Misfit for joints that are not two, do not turn, or do not hang on each other."""
+        """Raise IncompatibleComponent for joints that are not two, do not turn, or do not hang on each other."""
         pan_tilt_of(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -60,7 +61,7 @@ class PanTilt:
         """Stay at the present angles."""
         self._set(view, self.group.positions(view))
 
-    def stir(self, view: WritableView) -> None:
+    def excite(self, view: WritableView) -> None:
         """Turn a little, for the small run that tells engines apart."""
         self._set(view, [angle + 0.2 for angle in self.group.positions(view)])
 

@@ -12,11 +12,15 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.components.view import Mounting, WritableView
+from foosim.world.components.base import Model, Motion
+from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.view import Mounting, Slot, WritableView
 from foosim.world.forms.forms import BODY
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import EntitySettings
+from foosim.world.layout import Entity
 from foosim.world.matter.materials import WOOD, Radio
+from foosim.world.moving.leaf import InTheWay, Leaf
 from foosim.world.parameters.vehicles import HULL, Height, Speed, UprightAt, is_in_reach
 from foosim.world.placing import ORIGIN_OF_WORLD
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Link, Shape, Vector, turn
@@ -65,24 +69,63 @@ class DoorObject(EntitySettings):
         return x + share * dx, y + share * dy, z + share * dz
 
 
+STATE: Final = ("position", "linear_velocity", "opened", "blocked")
+"""The fields that this motion writes."""
+
+
+class Sliding(Motion):
+    """The share `opened` comes nearer to `open` by speed x tick / travel, unless something is in the way."""
+
+    def __init__(self, at: MotionMounting) -> None:
+        self._tick_s = at.spec.tick_ns / 1e9
+        self._in_the_way = InTheWay(at)
+        self._slots = {its.index: [at.slot(its, field) for field in (*STATE, "open")] for its in at.entities}
+        self._settings = at.settings(DoorObject)
+
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: WritableView) -> None:
+        """Advance these doors by a tick; they have no motors."""
+        for entity in entities:
+            self._move(self._settings[entity.index], self._slots[entity.index], view)
+
+    def _move(self, its: DoorObject, slots: Sequence[Slot], view: WritableView) -> None:
+        here, velocity, (opened,), (was_blocked,), (target,) = map(view.read, slots)
+        if opened == target and not (any(velocity) or was_blocked):
+            return
+        step = its.speed * self._tick_s / abs(its.travel)
+        share = min(max(target, opened - step), opened + step)
+        there = its.place_at(share)
+        is_blocked = share != opened and self._in_the_way.stops(_leaf(its, here), _leaf(its, there), view.start)
+        if is_blocked:
+            share, there = opened, its.place_at(opened)
+        speeds = [(new - old) / self._tick_s for new, old in zip(there, here, strict=True)]
+        for slot, numbers in zip(slots, (there, speeds, (share,), (float(is_blocked),)), strict=False):
+            view.write(slot, *numbers)
+
+
+def _leaf(its: DoorObject, place: Sequence[float]) -> Leaf:
+    x, y, z = place
+    yaw = its.closed.yaw
+    return Leaf(x, y, cos(yaw), sin(yaw), its.length / 2, its.width / 2, z, z + its.height)
+
+
 @model(
     "door",
     DoorObject,
     slots={**BODY, "heading": 1, "open": 1, "opened": 1, "blocked": 1},
     is_robot=False,
-    motion="door",
+    motion=Sliding,
     tags=("door",),
     units={"heading": ("rad",)},
     settable={"open": OPEN},
 )
-class Door:
+class Door(Model):
     """A door that slides open and shut, as far as it is told.
 
     `open` is the share of its way by which it is to be open, `opened` by which it is, `blocked` that something is in
     its way.
     """
 
-    is_upright: Final = False
+    is_upright = False
     """To others it is what its shape is, and no cylinder."""
 
     def __init__(self, settings: DoorObject, at: Mounting) -> None:

@@ -14,10 +14,13 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
+from foosim.world.components.base import Model, Motion
+from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.fires import FIRE
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model
 from foosim.world.forms.settings import EntitySettings
+from foosim.world.layout import Entity
 from foosim.world.matter.materials import OPEN
 from foosim.world.matter.mesh import Mesh
 from foosim.world.parameters.vehicles import UprightAt
@@ -59,17 +62,40 @@ def _cone(radius: float) -> Mesh:
     return convex_hull(np.array([*rim, (0.0, 0.0, radius)]))
 
 
+STATE: Final = ("radius", "joint_positions")
+"""The fields that this motion reads and writes."""
+
+
+class Growing(Motion):
+    """The radius grows with time, up to the greatest one. What is out stays out."""
+
+    def __init__(self, at: MotionMounting) -> None:
+        self._tick_s = at.spec.tick_ns / 1e9
+        self._slots = {its.index: tuple(at.slot(its, field) for field in STATE) for its in at.entities}
+        self._settings = at.settings(FireObject)
+
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: WritableView) -> None:
+        """Advance these fires by a tick; they have no motors."""
+        for entity in entities:
+            radius_slot, sunk = self._slots[entity.index]
+            its, (radius,) = self._settings[entity.index], view.read(radius_slot)
+            if radius > 0.0:
+                radius = min(radius + its.growth * self._tick_s, its.radius_max)
+            view.write(radius_slot, radius)
+            view.write(sunk, radius - its.radius_max)
+
+
 @model(
     "fire",
     FireObject,
     slots={"position": 3, "orientation": 4, "radius": 1, "joint_positions": 1},
     is_robot=False,
-    motion="fire",
+    motion=Growing,
     tags=(FIRE,),
     units={"radius": ("m",), "joint_positions": ("m",)},
     settable={"radius": RADIUS},
 )
-class Fire:
+class Fire(Model):
     """A fire; `radius` can be set, at most to the greatest one: 0 puts it out.
 
     It is drawn as a cone of the greatest radius that is sunk into the ground: what is above has the fire's own radius.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, SlotReadings, View
 from foosim.world.forms.quantities import Count, NewtonSeconds
 from foosim.world.forms.registry import sensor
@@ -25,8 +26,8 @@ class Touches(Struct, frozen=True):
     substep: Count
 
 
-@sensor("contact", ContactSettings, Touches, needs=("contacts",), speaks="contacts")
-class ContactSensor:
+@sensor("contact", ContactSettings, Touches, needs=("contacts",), trigger="contacts")
+class ContactSensor(Sensor):
     """Touches of a robot in the last tick: how many began, their impulse, the last substep with one."""
 
     def __init__(self, settings: ContactSettings, at: Mounting) -> None:

@@ -6,8 +6,9 @@ from msgspec import Struct
 
 from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import Name, default
+from foosim.world.components.base import Sensor
 from foosim.world.components.grasping import portables_of
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.forms.quantities import Kilograms, Share
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -28,7 +29,7 @@ class GripperState(Struct, frozen=True):
 
 
 @sensor("gripper_state", GripperStateSettings, GripperState)
-class GripperSensor:
+class GripperSensor(Sensor):
     """Whether a gripper is told to close, whether it holds something, and the mass of that."""
 
     def __init__(self, settings: GripperStateSettings, at: Mounting) -> None:
@@ -36,13 +37,13 @@ class GripperSensor:
         if f"{name}.held" not in offsets:
             grippers = [slot.removesuffix(".held") for slot in offsets if slot.endswith(".held")]
             what = f"{at.robot.name} has no such gripper; there are {', '.join(grippers) or 'none'}"
-            raise Misfit(("gripper",), what, name, nearest_quoted(name, grippers))
+            raise IncompatibleComponent(("gripper",), what, name, nearest_quoted(name, grippers))
         self._wanted, self._held = (at.of(at.robot, f"{name}.{slot}") for slot in ("wanted", "held"))
         self._masses = {one.entity.index: one.mass_kg for one in portables_of(at.spec, at.layout)}
 
     @staticmethod
     def check(settings: GripperStateSettings, at: Mounting) -> None:
-        """Raise Misfit for a gripper that the robot does not have."""
+        """Raise IncompatibleComponent for a gripper that the robot does not have."""
         GripperSensor(settings, at)
 
     def sample(self, view: View) -> GripperState:

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.quantities import Metres, MetresPerSecond, RadiansPerSecond
 from foosim.world.forms.registry import sensor
@@ -33,7 +34,7 @@ class BallState(Struct, frozen=True):
 
 
 @sensor("ball_state", BallStateSettings, BallState, kit="table")
-class BallStateSensor:
+class BallStateSensor(Sensor):
     """Position, velocity and spin of the ball, in the world frame."""
 
     def __init__(self, settings: BallStateSettings, at: Mounting) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Final
 
 from msgspec import Meta, Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, View
 from foosim.world.forms.forms import NO_ENTITY, TOUCHES, TOUCHES_MAX
 from foosim.world.forms.quantities import Count, NewtonSeconds
@@ -51,11 +52,11 @@ def _touches(settings: FigureContactSettings, counts: Mapping[str, int]) -> int:
     FigureContactSettings,
     FigureTouches,
     needs=(*TOUCHES,),
-    speaks="touches",
-    several=_touches,
+    trigger="touches",
+    array_length=_touches,
     kit="table",
 )
-class FigureContact:
+class FigureContact(Sensor):
     """Contacts of balls with the figures and the tube of a rod in the last tick."""
 
     def __init__(self, settings: FigureContactSettings, at: Mounting) -> None:

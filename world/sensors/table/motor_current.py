@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
+from foosim.world.components.base import Sensor
 from foosim.world.components.rows import Rows
-from foosim.world.components.view import Misfit, Mounting, View
+from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.forms.quantities import Amperes
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -38,7 +39,7 @@ class Currents(Struct, frozen=True):
 
 
 @sensor("motor_current", MotorCurrentSettings, Currents, needs=("joint_efforts",), kit="table")
-class MotorCurrent:
+class MotorCurrent(Sensor):
     """The currents of a rod's motors: force and torque in the last substep over the motors' constants."""
 
     def __init__(self, settings: MotorCurrentSettings, at: Mounting) -> None:
@@ -47,7 +48,8 @@ class MotorCurrent:
 
     @staticmethod
     def check(settings: MotorCurrentSettings, at: Mounting) -> None:
-        """Raise Misfit where neither the settings nor an actuator say what the constants of the motors are."""
+        """Raise IncompatibleComponent where neither the settings nor an actuator say what the constants of the motors
+        are."""
         _constants(settings, at)
 
     def sample(self, view: View) -> Currents:
@@ -76,13 +78,13 @@ class MotorCurrents(Rows):
 
 
 def _constants(settings: MotorCurrentSettings, at: Mounting) -> tuple[float, float]:
-    """Return newtons and newton metres per ampere. Raises Misfit."""
+    """Return newtons and newton metres per ampere. Raises IncompatibleComponent."""
     actuators = at.spec.robots[at.robot.name].actuators
     motors = [its.constants for _, its in sorted(actuators.items()) if isinstance(its, RodVoltageSettings)]
     found = []
     for number, (key, own) in enumerate((("slide", settings.slide), ("spin", settings.spin))):
         if own is None and not motors:
             what = f"nothing says how much a current moves: {key} is needed, or an actuator rod_voltage"
-            raise Misfit(("kind",), what, settings.kind)
+            raise IncompatibleComponent(("kind",), what, settings.kind)
         found.append(motors[0][number] if own is None else own)
     return found[0], found[1]

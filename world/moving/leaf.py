@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 from math import sqrt
 from typing import Final, NamedTuple
 
-from foosim.world.clearance.free_way import placed_shapes
-from foosim.world.clearance.solids import solid
 from foosim.world.components.entities import MotionMounting
 from foosim.world.layout import WORLD, Entity
+from foosim.world.moving.free_way import placed_shapes
+from foosim.world.moving.solids import solid
 from foosim.world.moving.upright import is_upright, made_model, upright_of
 from foosim.world.scene import Body
 

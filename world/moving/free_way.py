@@ -18,7 +18,11 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.clearance.solids import (
+from foosim.world.components.entities import MotionMounting
+from foosim.world.components.view import Slot, WritableView
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import WORLD, Entity
+from foosim.world.moving.solids import (
     Floats,
     Places,
     Solids,
@@ -30,10 +34,6 @@ from foosim.world.clearance.solids import (
     solid,
     solids,
 )
-from foosim.world.components.entities import MotionMounting
-from foosim.world.components.view import Slot, SolvingView
-from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import WORLD, Entity
 from foosim.world.moving.upright import is_upright, made_model, upright_of
 from foosim.world.scene import Body, Shape, place, swept_box
 
@@ -97,7 +97,7 @@ class FreeWay:
         assert (way > 0.0).all(), "the body of what moves says how fast it can be"
         return Movers(rows, radius, self._low[rows], self._high[rows], way, np.ceil(way / radius), is_level)
 
-    def near(self, movers: Movers, view: SolvingView) -> Near:
+    def near(self, movers: Movers, view: WritableView) -> Near:
         """Return what these may meet within the tick."""
         everybody = view.values[self._places]
         candidates = movers.candidates

@@ -1,0 +1,300 @@
+"""The base classes of components: what foosim calls of each, as hooks that are empty by default.
+
+A component derives from the class of its type, is registered by the decorator of that name (`world/forms/registry.py`)
+and overrides what it needs. It is made from its settings and its mounting, and is a pure function of the frame, its
+settings and keyed draws: what it remembers is slots, and its object keeps only what follows from deployment and layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from foosim.world.forms.jobs import JobState
+
+if TYPE_CHECKING:
+    from foosim.common.finding import Finding
+    from foosim.world.components.entities import Marked, MarkKind, Motors
+    from foosim.world.components.view import View, WritableView
+    from foosim.world.frame import Frame
+    from foosim.world.layout import Entity
+    from foosim.world.matter.physics import Physics
+    from foosim.world.scene import Body, Shape, Vector
+
+    Limits = Mapping[str, tuple[float, float]]
+
+
+class Component:
+    """What sensors, actuators, modifiers and rules of entities have in common."""
+
+    type_name: ClassVar[str] = ""
+
+    def __init__(self, settings: Any, at: Any) -> None:
+        """`at` is the mounting; the settings of an entity of a kit are None."""
+
+    @staticmethod
+    def check(settings: Any, at: Any) -> None:
+        """Raise IncompatibleComponent where the settings do not fit the robot or the world; `at` is the mounting.
+
+        A modifier gets the numbers that it is on in place of a mounting (`forms.per_field.Numbers`), and raises
+        BadValue.
+        """
+
+
+class Sensor(Component):
+    """A sensor of a robot."""
+
+    type_name = "sensor"
+    together: ClassVar[Any] = None
+    """A static method of a list of sensors of the class, that returns an object whose `sample(view)` returns the
+    numbers of their readings as an array (sensors, numbers), with the same bits. Their readings are of one length."""
+    rays: ClassVar[Any] = None
+    """A static method of (sensors, numbers of a frame) that returns both ends of each of their rays, for drawing: an
+    array (rays, 6), in m in the world frame."""
+
+    def sample(self, view: WritableView) -> Any:
+        """Return what is measured: a value of the registered reading."""
+        return None
+
+    def limits(self) -> Limits:
+        """Return the least and the greatest value that each field of a reading can have."""
+        return {}
+
+
+class Actuator(Component):
+    """An actuator of a robot."""
+
+    type_name = "actuator"
+    steady: ClassVar[bool] = False
+    """Whether `command` follows from the state of the robot and the slots alone, whatever the tick is: a rod that its
+    actuators have left as it was stays so, unsolved."""
+    FAILURES: ClassVar[Mapping[float, str]] = {}
+    """What the numbers in the slot `failure` mean, for whoever gave a job."""
+    together: ClassVar[Any] = None
+    """A static method of a list of actuators of the class, of robots that move by kinematics: it returns an object
+    whose `command(view)` returns an array (actuators, motors, 2), with the same bits."""
+
+    def accept(self, command: Any, view: WritableView) -> bool:
+        """Take a command within the limits, a value of the registered type, into the slots; False: it is refused."""
+        return False
+
+    def command(self, view: View) -> Motors:
+        """Return (target speed, greatest force or acceleration) of each motor of the robot, in SI units.
+
+        For motors of rigid bodies a third number may follow, `drives.Motor.slope`.
+        """
+        return ()
+
+    def limits(self) -> Limits:
+        """Return the least and the greatest value of each field of a command that has bounds."""
+        return {}
+
+    def bounds(self) -> Sequence[tuple[float, float]] | None:
+        """Return the least and the greatest value of each number of a command whose fields have several each."""
+        return None
+
+    def within(self, command: Any) -> Any:
+        """Return the command that is carried out instead, where limits are of several numbers together."""
+        return command
+
+    def names(self) -> Sequence[str]:
+        """Return what the numbers of a command are called in messages; nothing: as their fields."""
+        return ()
+
+    def problem(self, command: Any) -> str:
+        """Return why `accept` refuses a command in every state, for a warning; empty if it does not."""
+        return ""
+
+    def hold(self, view: WritableView) -> None:
+        """Ask for the present state from now on: the robot goes out of service, or comes back, or its job ended."""
+
+    def excite(self, view: WritableView) -> None:
+        """Ask for some motion, for the fixed small run that tells engines apart."""
+
+    def wrench(self, view: View) -> tuple[Vector, Vector] | None:
+        """Return a force (N) at the centre of mass of a free rigid base and a torque (N m), in its principal axes."""
+        return None
+
+    def unpowered(self) -> Motors | None:
+        """Return what is asked of the motors of a robot without power; None: a speed of 0 with the usual force."""
+        return None
+
+    def progress(self, view: WritableView) -> JobState:
+        """Return, after the robot was solved and while a job runs, whether it runs on, is done or has failed."""
+        return JobState.FAILED
+
+
+class Modifier(Component):
+    """A modifier of the readings of a sensor or the commands of an actuator. It works on numbers alone."""
+
+    type_name = "modifier"
+    together: ClassVar[Any] = None
+    """A static method of a list of modifiers of the class, that returns an object whose `apply(values, view)` does the
+    same to an array (modifiers, numbers)."""
+
+    def apply(self, values: list[float], view: WritableView) -> list[float] | None:
+        """Return what becomes of the numbers of a value; None: it is dropped."""
+        return values
+
+    def accept(self, values: list[float], view: WritableView) -> list[float] | None:
+        """Return what becomes of the numbers of a command; None: it is dropped, or waits."""
+        return self.apply(values, view)
+
+    def due(self, view: WritableView) -> list[float] | None:
+        """Return a command that had to wait and takes effect at this tick; None: there is none."""
+        return None
+
+
+class Model(Component):
+    """An entity of a model, in the frames of one layout."""
+
+    type_name = "model"
+    is_upright: bool = True
+    """Whether one that moves by kinematics is a cylinder to obstacles (`upright`), and not what its shapes are."""
+
+    def body(self) -> Body | None:
+        """Return its links and shapes; None of what has none."""
+        return None
+
+    def place(self, view: WritableView) -> None:
+        """Set its fields to what they are at tick 0. All are 0 before, and references -1."""
+
+    def check_place(self, position: Vector) -> None:
+        """Raise BadValue where it cannot be put in a running world (m, world frame)."""
+
+    def place_at(self, view: WritableView, position: Vector, velocity: Vector = (0.0, 0.0, 0.0)) -> None:
+        """Put it somewhere (m, m/s, world frame): overridden by models whose settings have no place."""
+
+    def derive(self, view: WritableView) -> None:
+        """Write the fields of a rigid model that follow from what the engine has computed, which is finite."""
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether its new, finite state can be: where it may be, within its speed limit and its reach."""
+        return True
+
+    def out_of_bounds(self, numbers: Sequence[float]) -> str:
+        """Return what is wrong with a state that no run should come to; empty if nothing is."""
+        return ""
+
+    def excite(self, view: WritableView) -> None:
+        """Set it in motion, for the fixed small run that tells engines apart."""
+
+    def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
+        """Return the numbers of its slots for a new value of something settable."""
+        return {field: (value,)}
+
+    def upright(self) -> Any:
+        """Return the cylinder that it is to obstacles (`moving.upright.Upright`); None: the one around its body."""
+        return None
+
+    def wheels(self) -> Any:
+        """Return its two driven wheels (`moving.wheels.Wheels`); None of what has none."""
+        return None
+
+
+class Motion:
+    """How the entities of a model without rigid-body dynamics move: one object moves all of a layout.
+
+    It is made from a `MotionMounting`, and may write all fields of these entities.
+    """
+
+    slots: ClassVar[Mapping[str, int]] = {}
+    """What it remembers of each entity, as `motion.FIELD`."""
+    takes_arrays: ClassVar[bool] = False
+    """Whether `motors` may be an array of shape (entities, motors, 2)."""
+
+    def move(self, entities: Sequence[Entity], motors: Any, view: Any) -> None:
+        """Write the state after a tick of these entities, whose motors are asked for this much.
+
+        `view.numbers` are those at the start of the tick, of all entities, before commands reached them. What is
+        written is read at the next tick, so that the order in which entities are moved changes nothing.
+        """
+
+
+class _Marking(Component):
+    mark_kinds: ClassVar[Mapping[str, MarkKind]] = {}
+    """What its marks look like, by kind."""
+
+    def apply(self, view: WritableView) -> None:
+        """Write what the rule does in this tick."""
+
+    def place(self, view: WritableView) -> None:
+        """Write what it has at tick 0."""
+
+    def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
+        """Return the numbers of its slots for a new value of something settable."""
+        return {field: (value,)}
+
+    def marks(self, before: Frame, after: Frame) -> Iterable[Marked]:
+        """Yield what it did between two frames, which may be several ticks apart."""
+        return ()
+
+
+class Rule(_Marking):
+    """A rule of the world: `apply` edits the frame before the tick is solved, on every node alike.
+
+    It is made from its settings and a `RuleMounting`.
+    """
+
+    type_name = "rule"
+
+    def status(self, view: View) -> Mapping[str, Any]:
+        """Return what is shown of it, for JSON."""
+        return {}
+
+    @staticmethod
+    def text(status: Any) -> str:
+        """Return the status in words; it has that of all rules and kits."""
+        return ""
+
+
+class EntityRule(_Marking):
+    """A rule of one entity: `apply` runs after the entity was solved; others are seen as at the start of the tick.
+
+    Marks are asked about frames that both have the entity.
+    """
+
+    type_name = "entity_rule"
+
+    def has_power(self, view: View) -> bool:
+        """Whether the drives of the entity have power in this tick."""
+        return True
+
+
+class Kit:
+    """A section of the deployment."""
+
+    type_name: ClassVar[str] = "kit"
+
+    def __init__(self, section: Any, spec: Any) -> None:
+        """It is made from the section and the deployment's world."""
+
+    @staticmethod
+    def check(section: Any, spec: Any) -> Iterable[Finding]:
+        """Yield what is wrong between settings, before any kit or robot is made."""
+        return ()
+
+    def shapes(self) -> tuple[Shape, ...]:
+        """Return its scenery."""
+        return ()
+
+    def physics(self) -> Physics | None:
+        """Return what rigid bodies feel; None of a kit without any."""
+        return None
+
+    def findings(self) -> Iterable[Finding]:
+        """Yield what is wrong with places: what needs all single settings to be right."""
+        return ()
+
+    def strays(self, frame: Frame) -> list[str]:
+        """Return descriptions of entities that are where no run should bring them."""
+        return []
+
+    def status(self, frame: Frame) -> Mapping[str, Any]:
+        """Return what is shown of it, for JSON."""
+        return {}
+
+    @staticmethod
+    def text(status: Any) -> str:
+        """Return the status in words; it has that of all rules and kits."""
+        return ""

@@ -1,1 +1,0 @@
-"""Motions: how entities without rigid-body dynamics go on, one file each."""
