@@ -141,7 +141,7 @@ class Clients:
             return
         if session is not None and not session.boot and not hello.returns and known is not None and known.active:
             self._miss(hello.name, "", LOST_MEANWHILE)
-        self._sessions.hello(hello, build, self._deployment, self._state, self._said(hello.name))
+        self._sessions.hello(hello, build, self._deployment, self._state, self._last_sent(hello.name))
 
     def on_join(self, join: Join, now_ns: int) -> bool:
         """Note a client's join, which takes effect at a tick that suits it; a member is sent what it has missed.
@@ -177,11 +177,11 @@ class Clients:
             self.repeated += 1
             return
         if not self._sessions.admits(session, len(up.packets), len(payload)):
-            self._state.refuse_at_door("inbox_full", len(up.packets))
+            self._state.reject_on_receipt("inbox_full", len(up.packets))
             return
         repeated = session.take(up.packets)
         if repeated:
-            self._state.refuse_at_door("duplicate", repeated)
+            self._state.reject_on_receipt("duplicate", repeated)
             session.heard = 0  # acknowledge again: it does not know what is recorded
 
     def on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
@@ -228,7 +228,7 @@ class Clients:
         if session is None or session.boot == join.boot or join.boot not in session.claims:
             return self._session(join)
         assert self._state is not None
-        if not self._sessions.take_over(join, self._state.deployment, self._state, self._said(join.name)):
+        if not self._sessions.take_over(join, self._state.deployment, self._state, self._last_sent(join.name)):
             return None
         known = self._state.members.get(join.name)
         if not session.returns and known is not None and known.active:
@@ -242,7 +242,7 @@ class Clients:
             return None
         return session
 
-    def _said(self, name: str) -> int | None:
+    def _last_sent(self, name: str) -> int | None:
         """Return the last downlink sent to a client: neither a Go without a Done nor one that is yet to be released."""
         member = None if self._state is None else self._state.members.get(name)
         if member is None or self._releases is None:

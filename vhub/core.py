@@ -66,9 +66,9 @@ from foosim.vhub.state.commits import Commits
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.state.resume import Past
-from foosim.vhub.status import HubStatistics, LinksTold, ShellStatus, report, report_before, statistics
+from foosim.vhub.status import HubStatistics, LinkLines, ShellStatus, report, report_before, statistics
 from foosim.vhub.wait_times import WaitTimes
-from foosim.vhub.watching import Watching
+from foosim.vhub.watching import WatchList
 from foosim.world.assembly.initial_state import first_chain
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
@@ -153,7 +153,7 @@ class HubCore:
         self.finished = False
         self.lost = self.failure = self.capture_file = ""
         self.shell = ShellStatus()
-        self.links_told, self.watching = LinksTold(), Watching()
+        self.link_lines, self.watching = LinkLines(), WatchList()
         self.busy = 0.0
         self.epoch = self._epoch_tick = self._end_ns = self._malformed = self._repeated = 0
         self.epoch_payload = b""
@@ -203,7 +203,7 @@ class HubCore:
         except Refused as error:
             self._malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
-                self.state.refuse_at_door("malformed")
+                self.state.reject_on_receipt("malformed")
             self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
@@ -669,7 +669,7 @@ class HubCore:
         refused, absences = self.refusals.by_sender(), {"boot": self.member.boot, **self.clients.absences.report()}
         if self.state is None or self.releases is None:
             return report_before(refused)
-        links = self.links_told.lines(self.state, self.watching.links, anew=is_last)
+        links = self.link_lines.lines(self.state, self.watching.links, anew=is_last)
         parts = links, self.watching.report(self.state), absences, self.releases.lateness, self.shell
         return report(self.state, refused, *parts)
 

@@ -31,7 +31,7 @@ _NUMBER_BYTES: Final = 8
 Pair = tuple[str, str]
 
 
-class Watching:
+class WatchList:
     """The watched links and channels, with their last drops and readings."""
 
     def __init__(self) -> None:

@@ -22,7 +22,7 @@ from foosim.vhub.network.draw_address import counts_within_channels
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.stages.told import Evidence
+from foosim.vhub.stages.explanation import Evidence
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import ENDS, Hub, deployment_of, rule

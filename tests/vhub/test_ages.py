@@ -161,7 +161,7 @@ def test_counts_are_few_and_their_quantiles_near(gaps: list[int]) -> None:
     assert all(known < 64 or known % (1 << (known.bit_length() - 6)) == 0 for known in age.counts)
     again = Ages(2)
     again.restore(ages.state())
-    assert again.state() == ages.state() and [a.counts for a in again.untold(9)] == [a.counts for a in ages.untold(9)]
+    assert again.state() == ages.state() and [a.counts for a in again.unreported(9)] == [a.counts for a in ages.unreported(9)]
 
 
 def test_what_a_client_does_not_hear_is_not_counted_and_a_new_process_knows_nothing() -> None:

@@ -82,14 +82,14 @@ class Ages:
         """Return the counts since the last row, when another one is due after the closing of a tick."""
         if (tick + 1) % self._every:
             return []
-        taken = self.untold(tick)
+        taken = self.unreported(tick)
         for pairs in self._heard.values():
             for heard in pairs.values():
                 add_counts(heard.whole, heard.recent)
                 heard.recent = {}
         return taken
 
-    def untold(self, tick: int) -> list[Age]:
+    def unreported(self, tick: int) -> list[Age]:
         """Return the counts since the last row up to the closing of a tick, by client, source and channel."""
         return [
             Age(tick, client, heard.source, heard.channel, dict(heard.recent))

@@ -13,8 +13,8 @@ from foosim.common.keyed_random import UNIT, Slot, chance_threshold
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.series_math import exp, ln, ln_gamma
+from foosim.vhub.stages.explanation import Explanation, Seen, beside
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told, beside
 
 CRC_FAIL: Final = "crc_fail"
 FLIP_BLOCK: Final = 1024
@@ -25,7 +25,7 @@ DEVIATIONS: Final = 12.0
 """Fewer flipped bits than the mean less this many deviations: less likely than 2^-64."""
 
 
-class Mangle(Stage):
+class Corruption(Stage):
     """Flips bits of a packet, or drops it for them; decides whether it is duplicated."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -37,7 +37,7 @@ class Mangle(Stage):
         self._thresholds: dict[int, int] = {}
 
     @classmethod
-    def for_link(cls, setup: LinkSetup) -> Mangle | None:
+    def for_link(cls, setup: LinkSetup) -> Corruption | None:
         settings = setup.settings
         errors = settings.corrupt is not None and settings.corrupt.bit_error_rate > 0.0
         return cls(setup) if errors or settings.duplicate > 0.0 else None
@@ -53,21 +53,21 @@ class Mangle(Stage):
             self._setup.memory.copies += 1
         return ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row, words = seen.row, seen.flight.words
-        told.facts["bits_flipped"] = row.bits_flipped
+        note.facts["bits_flipped"] = row.bits_flipped
         parts = []
         if seen.settings.corrupt is not None:
             rate, bits, draw = self._error_rate, 8 * row.size, words[Slot.CORRUPT]
             threshold = self._threshold(bits) if rate else 0
             flipped = "some" if row.cause == CRC_FAIL else str(row.bits_flipped)
-            told.facts |= {"error_rate": threshold / UNIT, "error_draw": draw / UNIT}
+            note.facts |= {"error_rate": threshold / UNIT, "error_draw": draw / UNIT}
             parts.append(f"{flipped} bits flipped: {beside(draw, threshold)}, {rate:g} a bit in {bits}")
         if self._doubled and row.copy == 0 and row.cause != CRC_FAIL:
             draw = words[Slot.DUPLICATE]
             copied = "a copy" if draw < self._doubled else "no copy"
             parts.append(f"{copied}: draw {draw / UNIT:g}, {seen.settings.duplicate:g}")
-        told.text = ", ".join(parts) or "a copy is not copied again"
+        note.text = ", ".join(parts) or "a copy is not copied again"
 
     def _threshold(self, bits: int) -> int:
         """Return the probability of any error in so many bits, in units of 2^-64."""

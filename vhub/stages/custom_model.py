@@ -19,8 +19,8 @@ from foosim.vhub.network.custom_models import VERSION_KEY, End, Judged, LinkMode
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.propagation import crossing_db
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 MODEL: Final = "model"
 MODEL_FAILED: Final = "model_failed"
@@ -33,7 +33,7 @@ DEPTH_MAX: Final = 16
 """Of lists and dicts in a memory."""
 
 
-class Own(Stage):
+class CustomModel(Stage):
     """Calls the model of one link."""
 
     def __init__(self, setup: LinkSetup, model: LinkModel) -> None:
@@ -46,7 +46,7 @@ class Own(Stage):
         self._trace = Trace()
 
     @classmethod
-    def for_link(cls, setup: LinkSetup) -> Own | None:
+    def for_link(cls, setup: LinkSetup) -> CustomModel | None:
         return None if setup.model is None else cls(setup, setup.model)
 
     def at_sending(self, flight: Flight) -> str:
@@ -64,13 +64,13 @@ class Own(Stage):
         flight.model_ns = judged.extra_ns
         return MODEL if judged.is_dropped else ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         model = self._setup.settings.model
         assert model is not None, "a link with a model of one's own"
         package = seen.evidence.versions.get(VERSION_KEY + model.name, "")
-        told.say("{model} of {package}", model=model.name, parameters=dict(model.parameters), package=package)
+        note.add("{model} of {package}", model=model.name, parameters=dict(model.parameters), package=package)
         failed = ", which failed" if seen.row.cause == MODEL_FAILED else ""
-        told.say("{}, {extra_ns} more delay", failed, extra_ns=seen.row.model_ns)
+        note.add("{}, {extra_ns} more delay", failed, extra_ns=seen.row.model_ns)
 
     def _passage(self, flight: Flight) -> Passage:
         source, destination = self._end(flight.source), self._end(flight.destination)

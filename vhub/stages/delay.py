@@ -14,8 +14,8 @@ from foosim.common.keyed_random import Slot, chance_threshold
 from foosim.vhub.network.jitter import interpolate_ns
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.explanation import Explanation, Seen, exact
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told, exact
 
 _JITTER: Final = int(Slot.JITTER)
 
@@ -45,7 +45,7 @@ class Delay(Stage):
         late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
         if timed or late or settings.delay_ns or setup.holds or setup.model is not None:
             return cls(setup)
-        return Behind(setup) if settings.order == "fifo" and setup.memory.last_due_ns >= 0 else None
+        return InOrder(setup) if settings.order == "fifo" and setup.memory.last_due_ns >= 0 else None
 
     def at_sending(self, flight: Flight) -> str:
         spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
@@ -71,7 +71,7 @@ class Delay(Stage):
             self.plan(flight)
         return ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row = seen.row
         parts = {
             "phase": row.phase_ns,
@@ -87,9 +87,9 @@ class Delay(Stage):
             "clog": row.held_ns,
         }
         parts["order, behind the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
-        told.facts = {what: ns for what, ns in parts.items() if ns}
-        text = " + ".join(f"{what} {exact(ns)}" for what, ns in told.facts.items()) or "no delay"
-        told.say("{} = due {due_ns}", text, due_ns=row.due_ns)
+        note.facts = {what: ns for what, ns in parts.items() if ns}
+        text = " + ".join(f"{what} {exact(ns)}" for what, ns in note.facts.items()) or "no delay"
+        note.add("{} = due {due_ns}", text, due_ns=row.due_ns)
 
     def plan(self, flight: Flight) -> None:
         """Delay a packet whose turn on the air is deferred."""
@@ -148,7 +148,7 @@ class Delay(Stage):
         return max(due_ns, last_ns + 1) if self._fifo else due_ns
 
 
-class Behind(Delay):
+class InOrder(Delay):
     """The stage of a link without delays that had some: packets arrive after earlier ones, otherwise at once."""
 
     def at_sending(self, flight: Flight) -> str:

@@ -68,7 +68,7 @@ def last_closings(
     if not closings and closed is not None:
         closings.append(_unjudged(state, commits, closed, now_ns))
     for closing in closings[-1:]:
-        closing.ages = state.ages.untold(state.closed)
+        closing.ages = state.ages.unreported(state.closed)
         for flight in state.in_flight():
             left = flight_of(state_of(flight))
             left.cause = IN_FLIGHT

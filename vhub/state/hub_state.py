@@ -58,9 +58,9 @@ class HubState:
         """The last tick whose deliveries are final. Those after the next tick are empty."""
         self.was_final = False
         """Whether the deliveries of the next tick were final before the last closing."""
-        self.at_door: dict[str, int] = {}
+        self.rejected_on_receipt: dict[str, int] = {}
         """Refusals of packets between closings, by cause: counted by the next closing."""
-        self.refused_at_door: list[tuple[str, int]] = []
+        self.counted_rejections: list[tuple[str, int]] = []
         """The refusals that the last closing counted: an input of it, which the journal has."""
         self.ages = Ages(self.tick_ns)
         self.aged: list[Age] = []
@@ -176,8 +176,8 @@ class HubState:
     def close_robots(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]]) -> Deliveries:
         """The part of phase two that robots wait for: return the deliveries of the next tick; `close_rest` follows."""
         tick = frame.tick
-        self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
-        for cause, count in self.refused_at_door:
+        self.counted_rejections, self.rejected_on_receipt = sorted(self.rejected_on_receipt.items()), {}
+        for cause, count in self.counted_rejections:
             self.refuse(cause, count)
         sendings = self._sendings = SendOrder()
         has_radios = self.fabric.profiles.on_radio
@@ -301,9 +301,9 @@ class HubState:
         self.refusals[cause] = self.refusals.get(cause, 0) + count
         return False
 
-    def refuse_at_door(self, cause: str, count: int = 1) -> None:
+    def reject_on_receipt(self, cause: str, count: int = 1) -> None:
         """Add packets that are refused between closings; the next closing counts them."""
-        self.at_door[cause] = self.at_door.get(cause, 0) + count
+        self.rejected_on_receipt[cause] = self.rejected_on_receipt.get(cause, 0) + count
 
     def _addressed(self, source: str, destination: str, channel: str) -> tuple[str, ...]:
         """Return a packet's receivers: its destination, or the clients that subscribe to the channel, by name.

@@ -148,7 +148,7 @@ def tick_record(
     """Return the record of a closing, which is journalled before its deliveries are sent."""
     sampled = [raw for raw, message in samples if message.digest == closing.digest]
     clients = sorted(admitted.items()), closing.joins, closing.leaves
-    given = state.refused_at_door, deliveries, closing.owing
+    given = state.counted_rejections, deliveries, closing.owing
     return encode(TickRecord(closing.frame.tick, commit, sampled, *clients, *given))
 
 
@@ -243,7 +243,7 @@ class Fold:
             state.join(joining, record.tick)
         released = state.close_world(frame, packets, closing.fates, commit.edits)
         count_downlinks(state, frame.tick, released)
-        state.at_door = dict(record.refused)
+        state.rejected_on_receipt = dict(record.refused)
         closing.owing += record.owing
         for name in record.owing:
             state.leave(name)

@@ -109,7 +109,7 @@ def recall(
         elif captured is not None and folded.record.tick == captured.tick:
             past.known = folded.closing.frame
     if captured is not None:
-        past.kept = list(_untold(found, closings, captured.epoch))
+        past.kept = list(_not_captured(found, closings, captured.epoch))
     past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
     past.absences = fold.absences
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
@@ -119,7 +119,7 @@ def recall(
     return past
 
 
-def _untold(
+def _not_captured(
     found: Iterable[object], closings: Mapping[int, Closing], epoch: int
 ) -> Iterator[RecordClosing | RecordEpoch]:
     """Yield closings by tick, each followed by the epochs that begin after it, in the order of the journal."""
