@@ -30,13 +30,13 @@ from foosim.world.matter.materials import RadioMaterial
 from foosim.world.scene import Vector
 
 OLDER_MAX: Final = 1024
-"""So many former places are remembered; then they are forgotten."""
+"""At this count of remembered former places all are forgotten."""
 BLOCKED: Final = "blocked"
 OUT_OF_RANGE: Final = "out_of_range"
 NEVER_CDB: Final = 10**6
-"""A loss that nothing gets over."""
+"""A loss that no signal exceeds."""
 LOSS_MAX_DB: Final = 400
-"""More than this is not told from it, where it is asked whether no more is lost."""
+"""Losses above this count as equal when bounding reach."""
 
 
 def _distance_m(a: Vector, b: Vector) -> float:
