@@ -13,7 +13,6 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from foosim.common.keyed_random import Slot
 from tests.links.offered import MS, every, fabric_of, fates, poisson_ns, uniforms
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_p, binomial_z, chi_square, contingency
@@ -35,11 +34,6 @@ def test_independent_loss_has_its_probability(proof: Proof, percent: float) -> N
     n = proof.size(100_000, 1_000_000)
     count = sum(losses(f"loss: {percent} %", n, proof.seed))
     proof.likely("T1", f"independent loss of {percent:g} % (exact binomial)", binomial_p(count, n, percent / 100), n)
-
-
-def test_independent_loss_has_its_cause() -> None:
-    causes = {flight.cause for flight in fates(fabric_of("loss: 50 %"), every(MS, 1000))}
-    assert causes == {"", "random_loss"}
 
 
 @pytest.mark.parametrize("by", ["size", "channel", "time of day", "time between packets", "the packet before"])
@@ -169,11 +163,3 @@ def test_single_losses_beside_bursts_add_up(proof: Proof) -> None:
     share, w = 1 / 6, 0.4
     z = (burst / n - share) / sqrt(share * (1 - share) / n * (1 + w) / (1 - w))
     proof.normal("T3", "bursts beside losses", z, n)
-
-
-def test_what_a_packet_draws_for_loss_is_uniform(proof: Proof) -> None:
-    n = proof.size(50_000, 1_000_000)
-    counts = [0] * 256
-    for flight in fates(fabric_of("loss: 1 %", proof.seed), every(MS, n)):
-        counts[flight.words[Slot.LOSS] >> 56] += 1
-    proof.likely("T1", "draws for loss are uniform (256 classes)", chi_square(counts, [n / 256] * 256), n)
