@@ -77,7 +77,7 @@ HubAction = Action | RecordClosing | RecordEpoch
 
 
 class _Step(Enum):
-    """How far the closing of a tick is behind its world phase."""
+    """How far the closing of a tick is after its world phase."""
 
     OPEN = 0
     """It waits for Dones."""
@@ -290,8 +290,8 @@ class HubCore:
 
     @property
     def lacking(self) -> tuple[Channel, int]:
-        """The channel, and how many messages of it, without which no tick is closed; free-running clients wake nobody.
-        Where deliveries are final nobody waits for a closing: those ticks are closed together."""
+        """The channel, and how many messages of it, without which no tick is closed; messages of free-running
+        clients are not among them. Ticks whose deliveries are final already are closed together."""
         if self.state is None:
             return channels.COMMIT, 1
         if self.epoch == 0 or self.clients.waited:
@@ -385,7 +385,7 @@ class HubCore:
         return True
 
     def _release_closed(self, world: _World, sent_ns: int) -> None:
-        """Behind the deliveries, release to free-running clients what is due by now."""
+        """After the deliveries, release to free-running clients what is due by now."""
         state, releases = self.state, self.releases
         assert state is not None and releases is not None
         for name, flights in world.free.items():
@@ -396,7 +396,7 @@ class HubCore:
         world.step, world.sent_ns = _Step.RELEASED, sent_ns
 
     def _close_rest(self, world: _World) -> None:
-        """Judge what clients sent to clients, which nobody waits for, and hand the closing to the capture."""
+        """Judge the packets between clients, which no process waits for, and hand the closing to the capture."""
         state, releases, tick = self.state, self.releases, world.frame.tick
         assert state is not None and releases is not None
         world.closing.fates += state.close_rest()
@@ -422,8 +422,8 @@ class HubCore:
         factor = self.releases.factor
         text = self.waits.close(now_ns, int(self.state.tick_ns / factor / 2) if factor else limits.COUNTER_MAX)
         if text:
-            told = Heartbeat(channels.VHUB, self.state.closed + 1, self.epoch, text, self.lost, self.busy, b"")
-            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(told)))
+            late = Heartbeat(channels.VHUB, self.state.closed + 1, self.epoch, text, self.lost, self.busy, b"")
+            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(late)))
 
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""

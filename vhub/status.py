@@ -87,7 +87,7 @@ def report(
     delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
     Ages at use are [channel, uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts
     messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,
-    null if none did. What somebody looks at is under `watched` (`WatchList.report`).
+    null if none did. Watched links and readings are under `watched` (`WatchList.report`).
     """
     packets = state.packets
     return encode_json(
@@ -125,12 +125,12 @@ def _links(state: HubState, watched: Collection[tuple[str, str]]) -> list[list[A
             p50, p99 = (quantile(age.counts, share) * state.tick_ns for share in (0.5, 0.99))
             ages.setdefault(key, []).append((age.channel, sum(age.counts.values()), p50, p99))
     order = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))
-    told = order[:LINKS_REPORTED_MAX] + [item for item in order[LINKS_REPORTED_MAX:] if item[0][:2] in watched]
+    chosen = order[:LINKS_REPORTED_MAX] + [item for item in order[LINKS_REPORTED_MAX:] if item[0][:2] in watched]
     return [
         [
             *key[:2],
             *(its.offered, its.delivered, its.dropped, its.delay_ns // its.delivered if its.delivered else 0),
             *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items())), ages.get(key, [])),
         ]
-        for key, its in sorted(told, key=lambda item: item[0])
+        for key, its in sorted(chosen, key=lambda item: item[0])
     ]

@@ -59,8 +59,8 @@ def chi_square(observed: Sequence[int], expected: Sequence[float]) -> float:
         classes[-1][0] += count
         classes[-1][1] += due
     if len(classes) > 1 and classes[-1][1] < 5.0:
-        count, due = classes.pop()
-        classes[-1] = [classes[-1][0] + count, classes[-1][1] + due]
+        last = classes.pop()
+        classes[-1] = [classes[-1][0] + last[0], classes[-1][1] + last[1]]
     assert len(classes) >= 2, "too few counts for a test"
     statistic = sum((count - due) ** 2 / due for count, due in classes)
     return float(stats.chi2.sf(statistic, len(classes) - 1))

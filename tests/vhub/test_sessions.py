@@ -186,7 +186,7 @@ def test_no_other_client_can_make_the_run_wait_for_it(period: int) -> None:
     hub = Hub().begin()
     hub.enter("ear", period)
     assert hub.core.statistics().malformed == 1
-    assert "ear joins in lockstep, it is not declared so: the run would wait for it" in hub.lines()[-1]
+    assert "ear joins in lockstep, but is not declared lockstep" in hub.lines()[-1]
     for tick in range(12):
         hub.close(tick)
     assert hub.state.closed == 11 and "ear" not in hub.state.members

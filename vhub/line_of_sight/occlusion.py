@@ -38,7 +38,7 @@ UNKNOWN: Vector = (inf, inf, inf)
 
 
 class Crossing(NamedTuple):
-    """A thing that a line crosses: its name (of the scenery, or the entity's), what it is made of, the way through it.
+    """A thing that a line crosses: its name (of the scenery, or the entity's), its material, the way through it.
 
     `chord_m` is how far the line is inside of it, 0 for a wall without a thickness of its own. `entry_m` and `exit_m`
     are the distances from the lesser end at which it begins and ends.

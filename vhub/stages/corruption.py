@@ -70,7 +70,7 @@ class Corruption(Stage):
         note.text = ", ".join(parts) or "a copy is not copied again"
 
     def _threshold(self, bits: int) -> int:
-        """Return the probability of any error in so many bits, in units of 2^-64."""
+        """Return the probability of any error in a number of bits, in units of 2^-64."""
         found = self._thresholds.get(bits)
         if found is None:
             if len(self._thresholds) >= SIZES_KEPT:

@@ -1,8 +1,8 @@
 """Custom link model: a user's code decides packets that have passed the stages before.
 
-It is given the world of the newest frame, the packet's own draws and what it has left as memory; what it says is
-checked. A model that breaks its word, or raises, is a failure of the run: the packet is lost (`model_failed`), and the
-vHub ends the run in order. Neighbour: `link_models` (what a model is, and how one is found).
+It gets the world of the newest frame, the packet's own draws and its memory of the packet before; its answer is
+checked. A model that raises or gives an invalid answer is a failure of the run: the packet is lost (`model_failed`),
+and the vHub ends the run in order. Neighbour: `network/custom_models` (the interface of a model, and its loading).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class CustomModel(Stage):
         except Exception as error:  # noqa: BLE001  # raised by a user's code
             problem = f"{type(error).__name__}: {show(str(error), SHOWN_MAX)}"
         if problem:
-            self._tell(flight, problem)
+            self._report(flight, problem)
             return MODEL_FAILED
         memory.model = kept
         flight.model_ns = judged.extra_ns
@@ -97,7 +97,7 @@ class CustomModel(Stage):
         world = self._setup.world
         return End(endpoint, world.antenna(endpoint, self._mount), world.velocity(endpoint))
 
-    def _tell(self, flight: Flight, problem: str) -> None:
+    def _report(self, flight: Flight, problem: str) -> None:
         """End the run at the first failure: its network would not be the requested one."""
         model, faults = self._setup.settings.model, self._setup.faults
         if model is not None and not faults:
@@ -106,12 +106,12 @@ class CustomModel(Stage):
             faults.append(f"link model {model.name} failed on packet {packet}, {when}: {problem}")
 
 
-def problem_of(said: object) -> str:
+def problem_of(answer: object) -> str:
     """Return what is wrong with a model's answer; empty for a valid one."""
-    if not isinstance(said, Judged):
-        return f"it returns {type(said).__name__}, not Judged"
-    answer: tuple[Any, ...] = said  # a tuple holds whatever it was made with
-    is_dropped, extra_ns, memory = answer
+    if not isinstance(answer, Judged):
+        return f"it returns {type(answer).__name__}, not Judged"
+    fields: tuple[Any, ...] = answer  # a tuple holds values of any type
+    is_dropped, extra_ns, memory = fields
     if not isinstance(is_dropped, bool):
         return f"is_dropped is {show(is_dropped)}, not True or False"
     if type(extra_ns) is not int or not 0 <= extra_ns <= EXTRA_NS_MAX:

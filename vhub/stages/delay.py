@@ -1,8 +1,8 @@
 """Delay: queue, access, airtime and propagation, the constant delay, a model's, jitter, clogs; then the link's order.
 
-Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
-they say otherwise. A clog that is asked for, or healed, while packets are on their way moves their due times: as if it
-had been known when they were sent.
+Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo by
+default. A request that begins or heals a clog moves the due times of packets in flight, as if it had been known when
+they were sent.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Delay(Stage):
     def put_off(self, flight: Flight, by_ns: int, last_ns: dict[int, int]) -> None:
         """Delay a packet; `last_ns` are the due times of the deferred ones before it, by link.
 
-        It is called in the order of sending, also of those behind them that are not.
+        It is called in the order of sending, also for later packets that are not deferred.
         """
         free_ns = flight.due_ns - flight.held_ns + by_ns
         due_ns = self._held_ns(free_ns) if self._holds else free_ns
@@ -119,7 +119,7 @@ class Delay(Stage):
     def retime(self, flights: Iterable[tuple[Flight, bool]], now_ns: int) -> None:
         """Set the due times of packets in flight, in the order of sending, by the present clogs.
 
-        Each comes with whether those behind it overtake it. What is due already, and waits for its receiver, stays.
+        Each comes with whether later packets may overtake it. Packets that are due and wait for their receiver stay.
         """
         last_ns = -1
         for flight, is_late in flights:

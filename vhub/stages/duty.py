@@ -2,7 +2,7 @@
 
 In no window of the given length, wherever it begins, is the radio on air for more than its share; of what is on air at
 the window's edge the part within counts. Source: ETSI EN 300 220-1, where the duty cycle is the time on air in an
-observation interval over that interval's length, one hour unless said otherwise (recalled, unverified).
+observation interval over that interval's length, one hour by default (recalled, unverified).
 It is for media on which a packet is sent once, for a time that is known before: LoRa, and a radio with a rate.
 """
 

@@ -171,7 +171,7 @@ class OnAir(Stage):
                 yield "error" if attempt < row.retries or (is_lost and not seen.is_broadcast) else "got across"
 
     def odds(self, contenders: int, size: int, broadcast: bool) -> tuple[int, int] | None:
-        """Return below which words an attempt collides, and finds no free channel; None where nobody contends."""
+        """Return below which words an attempt collides, and finds no free channel; None without contention."""
         return None
 
     def _note(self, flight: Flight, shared: Sending) -> None:

@@ -11,7 +11,7 @@ from typing import Final
 
 from foosim.deployment.network.radios import Radio
 from foosim.vhub.network.link_context import LinkSetup
-from foosim.vhub.network.memory import RadioState, Sending
+from foosim.vhub.network.memory import Sending
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.policy import EXPIRED
@@ -134,9 +134,4 @@ class Queue(Stage):
         return now_ns >= sender.first_above_ns
 
     def _law(self, limits: Limits, time_ns: int) -> int:
-        return time_ns + int(limits.interval_ns / sqrt(sender_count(self._sender)))
-
-
-def sender_count(sender: RadioState) -> int:
-    """Return CoDel's count, at least 1."""
-    return max(1, sender.drop_count)
+        return time_ns + int(limits.interval_ns / sqrt(max(1, self._sender.drop_count)))

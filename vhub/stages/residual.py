@@ -66,7 +66,7 @@ class Residual(Stage):
 
 
 class InTime(Residual):
-    """Bad times of a link, whoever sends in them."""
+    """Bad times of a link, the same for all its packets."""
 
     def __init__(self, setup: LinkSetup, episodes: Episodes, bad_loss: float) -> None:
         super().__init__(setup, 0.0, bad_loss)

@@ -239,8 +239,8 @@ class HubState:
     def hears_clients(self) -> bool:
         """Whether the closing of the next tick has joins, leaves and packets of clients as inputs.
 
-        Not where the deliveries behind that tick are final already. No lockstep client is due then, and while a
-        free-running one is here it does not happen: it is for those who come and go that this waits.
+        Not where the deliveries after that tick are final already: then no lockstep client is due and no free-running
+        one takes part, so only joins and leaves wait.
         """
         return self.closed + 1 >= self.final
 
@@ -249,7 +249,7 @@ class HubState:
 
         That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
         filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
-        What a sensor measures besides its rate is for clients, who are asked when they are due.
+        Samples besides a sensor's rate go to clients, which act when they are due.
         """
         if not self._here.is_complete:
             return 0
@@ -272,7 +272,7 @@ class HubState:
 
     def _is_clogged(self, tick: int) -> bool:
         """Whether a clog, which may end at any tick, delays a packet to a robot or to a client that acts at arrival."""
-        if not self.fabric.timeline.has_holds:
+        if not self.fabric.timeline.holds:
             return False
         flights = (flight for arrival, those in self._flights.items() if arrival > tick for flight in those)
         held = (flight for flight in flights if flight.held_ns > 0)

@@ -80,7 +80,7 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     """One closed tick: commit and samples as received, admitted packets, joins and leaves, and the result.
 
     `refused` counts by cause what was refused at the door since the tick before. `owing` left while the tick waited for
-    their Dones: its Go was said to them, and they are gone when what clients sent is judged.
+    their Dones: they were sent its Go, and have left when the packets of clients are judged.
     """
 
     tick: int
@@ -133,8 +133,8 @@ def closing_of(
 ) -> Closing:
     """Return the closing of a committed frame's tick, without its fates; `state` is that before it."""
     delivered = state.deliveries.get(frame.tick - 1, [])
-    told = wall_ns, commit.recovered, chain
-    return Closing(frame, commit.digest, commit.edits, delivered, joins, leaves, [], *told)
+    what = wall_ns, commit.recovered, chain
+    return Closing(frame, commit.digest, commit.edits, delivered, joins, leaves, [], *what)
 
 
 def tick_record(
@@ -192,7 +192,7 @@ class Folded:
 class Fold:
     """Computes the closings of a journal again from its records, the first of which is a head.
 
-    Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those behind
+    Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those after
     it. Raises Malformed when the records are not those of one run of this version.
     """
 

@@ -74,7 +74,7 @@ class Past:
         """Return the first actions: complete the capture, log the position."""
         actions: list[Action | RecordClosing | RecordEpoch] = [*self.kept]
         if self.epoch is not None:
-            actions.append(Log("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
+            actions.append(Log("info", f"resumes after tick {self.state.closed} in epoch {self.epoch.epoch}"))
         return actions
 
 
@@ -84,7 +84,7 @@ def recall(
     """Return what the records of a journal say; None when they are of no run or hold nothing.
 
     `captured` is how far the capture is, None when there is none; downlinks of the last `kept_ns` of simulated time
-    are said again. Raises Malformed for the journal of another run, and for one that contradicts itself.
+    are kept to be sent again. Raises Malformed for the journal of another run, and for one that contradicts itself.
     """
     if not records:
         return None
