@@ -132,6 +132,7 @@ def test_an_earlier_gate_beats_a_later_one(proof: Proof) -> None:
             link.arrive(flight, "rx_down" if gates[-1][0] == "rx_down" else "")
         wrong += flight.cause != gates[0][0]
     proof.exact("T24", "combinations of gates in which not the first names the cause", wrong, 0, 2 ** len(GATES) - 1)
+    assert [flight.cause for flight in fates(fabric_of("mtu: 40 B"), [0, 1], [40, 41])] == ["", "too_big"]
 
 
 def test_what_is_dropped_early_leaves_later_stages_as_they_were() -> None:
