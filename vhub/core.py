@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from foosim.common import limits
 from foosim.common.errors import Malformed, Refused
+from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Log, Publish
@@ -66,7 +67,7 @@ from foosim.vhub.state.commits import Commits
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.state.resume import Past
-from foosim.vhub.status import HubStatistics, LinkLines, ShellStatus, report, report_before, statistics
+from foosim.vhub.status import HubStatistics, LinkLines, ShellStatus, report, statistics
 from foosim.vhub.wait_times import WaitTimes
 from foosim.vhub.watching import WatchList
 from foosim.world.assembly.initial_state import first_chain
@@ -668,7 +669,7 @@ class HubCore:
     def _report(self, *, is_last: bool = False) -> bytes:
         refused, absences = self.refusals.by_sender(), {"boot": self.member.boot, **self.clients.absences.report()}
         if self.state is None or self.releases is None:
-            return report_before(refused)
+            return encode_json({"refused": refused})
         links = self.link_lines.lines(self.state, self.watching.links, anew=is_last)
         parts = links, self.watching.report(self.state), absences, self.releases.lateness, self.shell
         return report(self.state, refused, *parts)

@@ -67,11 +67,6 @@ class LinkLines:
         return self._lines
 
 
-def report_before(refused: Mapping[str, Any]) -> bytes:
-    """Return the report of a vHub that has not joined a run yet."""
-    return encode_json({"refused": refused})
-
-
 def report(
     state: HubState,
     refused: Mapping[str, Any],

@@ -223,7 +223,7 @@ def multiple_echoes(material: str, thickness_m: float, f_ghz: float) -> float:
 def test_a_slab_is_the_sum_of_its_echoes(proof: Proof, material: str) -> None:
     """Another derivation with Fresnel's coefficients and the vacuum's permittivity."""
     off = []
-    for thickness_m, f_ghz in ((0.004, 2.4), (0.05, 5.9), (0.15, 0.868), (0.012, 5.25), (0.3, 2.44)):
+    for thickness_m, f_ghz in ((0.004, 2.4), (0.05, 5.9), (0.15, 0.868), (0.012, 5.25)):
         expected = multiple_echoes(material, thickness_m, f_ghz)
         off.append(abs(slab_loss_db(material, thickness_m, f_ghz * 1e9) - expected))
     proof.below("T18", f"P.2040, {material}: dB off the sum of its echoes", max(off), 0.02, len(off))

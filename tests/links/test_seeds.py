@@ -47,14 +47,6 @@ def test_slots_and_links_do_not_correlate(proof: Proof) -> None:
     proof.below("T23", "correlation of a packet with the next", follow, limit, n)
 
 
-def test_neighbouring_seeds_do_not_correlate(proof: Proof) -> None:
-    n = proof.size(2000, 50_000)
-    found = [[w[Slot.JITTER] for w in draws(fabric_of("loss: 1 %", seed), ("a", "b"), n)] for seed in range(1, 9)]
-    limit = (4 if not proof.is_full else 5.5) / n**0.5
-    worst = max(abs(correlation(one, other)) for one, other in combinations(found, 2))
-    proof.below("T23", "greatest correlation of two seeds (28 pairs)", worst, limit, n)
-
-
 def test_every_slot_is_uniform(proof: Proof) -> None:
     n = proof.size(20_000, 500_000)
     counts = [[0] * 256 for _ in Slot]

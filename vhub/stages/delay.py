@@ -128,7 +128,7 @@ class Delay(Stage):
             free_ns = flight.due_ns - flight.held_ns
             flight.due_ns = self._held_ns(free_ns)
             if not is_late:
-                last_ns = flight.due_ns = self._in_order(flight.due_ns, last_ns)
+                last_ns = flight.due_ns = max(flight.due_ns, last_ns + 1) if self._fifo else flight.due_ns
             flight.held_ns = flight.due_ns - free_ns
         if self._fifo:
             self._memory.last_due_ns = max(last_ns, min(self._memory.last_due_ns, now_ns))
@@ -143,9 +143,6 @@ class Delay(Stage):
             if start_ns <= due_ns < end_ns:
                 due_ns = end_ns
         return due_ns
-
-    def _in_order(self, due_ns: int, last_ns: int) -> int:
-        return max(due_ns, last_ns + 1) if self._fifo else due_ns
 
 
 class InOrder(Delay):
