@@ -85,6 +85,8 @@ def test_sent_is_delivered_or_dropped_or_in_flight(
         for key, link in links.items():
             still = sum((f.source, f.destination) == key[:2] for f in flying)
             assert link.offered == link.delivered + link.dropped + still, key
+        copies = [flight for flight in (*hub.fates, *hub.state.in_flight()) if flight.copy]
+        assert sum(link.copies for link in links.values()) == account.copies == len(copies)
     final = [f for f in hub.fates if not f.copy]
     assert len({(f.source, f.destination, f.sequence) for f in final}) == len(final), "one fate each"
     assert len(final) + len(flying) == sum(offered.values()) + len(said)

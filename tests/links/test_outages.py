@@ -87,6 +87,7 @@ def test_two_flows_on_one_link_in_turns() -> None:
     [
         ("burst: {loss: 5 %, mean_bad: 40 ms}", 0.05, 40.0),
         ("burst: {loss: 5 %, mean_bad: 40 ms, bad_loss: 50 %}", 0.05, 40.0),
+        ("burst: {loss: 25 %, mean_bad: 20 ms, dwell: {alpha: 1.5, max: 400 ms}}", 0.25, 100.0),
         ("outages: {mean_on: 300 ms, mean_off: 100 ms}", 0.25, 100.0),
         ("outages: {mean_on: 300 ms, mean_off: 100 ms}, loss: 20 %", 0.25 + 0.75 * 0.2, 100.0),
         ("outages: {mean_on: 300 ms, mean_off: 100 ms}, burst: {loss: 5 %, mean_bad: 40 ms, bad_loss: 50 %}",

@@ -68,7 +68,7 @@ def test_packets_leave_at_the_anchor_plus_the_latest_due_time(steps: list[Any], 
             waiting.append((at_ns, client, count[client]))
         elif step == "pace":
             if what != [factor, paused]:
-                anchors, waiting = [], [(0, *rest) for _, *rest in waiting]
+                anchors, waiting = [], [(0, name, number) for _, name, number in waiting]
             factor, paused = what
             made.set_tempo(factor, paused)
         else:
