@@ -430,8 +430,8 @@ def test_lines_that_drive_through_litter_cross_what_is_there_with_and_without_a_
     rng = random.Random(26)
     things = tuple(thing(Box((0.12, 0.08, 0.16)), at_random(rng, 1.5), name=f"box{n}") for n in range(150))
     sight, singles, trace, found = sight_of(*things), [sight_of(one) for one in things], Trace(), 0
-    for _ in range(30):
-        ends, which, axis, step = [*line_through(rng, 1.5, 1.5)], rng.randrange(2), rng.randrange(3), 0.1
+    for drive in range(60):
+        ends, which, axis, step = [*line_through(rng, 1.2, 0.5)], drive % 2, drive % 3, rng.choice((-0.1, 0.1))
         for _ in range(15):
             ends[which] = moved((ends[which],) * 2, ((step, 0.0, 0.0), (0.0, step, 0.0), (0.0, 0.0, step))[axis])[0]
             a, b = ends
