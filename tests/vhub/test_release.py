@@ -65,7 +65,7 @@ def test_packets_leave_at_the_anchor_plus_the_latest_due_time(steps: list[Any], 
             at_ns = max([now, *(at_ns for at_ns, name, _ in waiting if name == client)])
             if anchors and due:
                 at_ns = max(at_ns, min(anchor for _, anchor in anchors) + int((tick * T + max(due)) / factor))
-            waiting.append((at_ns, client, count[client]))
+            waiting = sorted([*waiting, (at_ns, client, count[client])])
         elif step == "pace":
             if what != [factor, paused]:
                 anchors, waiting = [], [(0, name, number) for _, name, number in waiting]
@@ -73,12 +73,12 @@ def test_packets_leave_at_the_anchor_plus_the_latest_due_time(steps: list[Any], 
             made.set_tempo(factor, paused)
         else:
             now += what[0]
-            leaving = sorted(one for one in waiting if one[0] <= now)
+            leaving = [one for one in waiting if one[0] <= now]
             assert [(release.client, release.number) for release in made.take(now)] == [one[1:] for one in leaving]
             waiting = [one for one in waiting if one[0] > now]
         assert made.deadline_ns == min((at_ns for at_ns, _, _ in waiting), default=None)
     assert [(release.client, release.number) for release in made.take(0, everything=True)] == [
-        one[1:] for one in sorted(waiting)
+        one[1:] for one in waiting
     ]
 
 
