@@ -20,9 +20,9 @@ from foosim.common.keyed_random import Slot
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages import STAGES
-from foosim.vhub.stages.admission import Admit
+from foosim.vhub.stages.admission import Admission
+from foosim.vhub.stages.explanation import Evidence, Explanation, Seen, exact
 from foosim.vhub.stages.policy import EXPIRED
-from foosim.vhub.stages.told import Evidence, Seen, Told, exact
 from foosim.vhub.state.hub_state import OUTBOX_SHIFT
 from foosim.world.frame import Frame
 
@@ -121,17 +121,17 @@ def explain_row(evidence: Evidence, row: PacketRow) -> Explained:
     steps = []
     for name, make, _ in STAGES:
         # A body's link is made anew when it goes out of service; here it is the one that it had in service.
-        stage = make(seen.setup) or (Admit(seen.setup) if name == dropped_by == "admission" else None)
+        stage = make(seen.setup) or (Admission(seen.setup) if name == dropped_by == "admission" else None)
         if stage is None:
             steps.append(Step(name, "not on this link", "nothing to do on this link"))
         elif ended:
             steps.append(Step(name, "not reached", "not reached"))
         else:
-            told = Told()
-            stage.explain(seen, told)
+            note = Explanation()
+            stage.explain(seen, note)
             is_drop = name == dropped_by
-            text = f"{told.text}: {row.cause}" if is_drop else told.text
-            steps.append(Step(name, "dropped" if is_drop else "passed", text, told.facts))
+            text = f"{note.text}: {row.cause}" if is_drop else note.text
+            steps.append(Step(name, "dropped" if is_drop else "passed", text, note.facts))
             ended = is_drop and row.arrival_tick < 0
     words = seen.flight.words
     drawn = ((Slot.LOSS, row.loss_word), (Slot.JITTER, row.jitter_word), (Slot.ERROR, row.error_word))

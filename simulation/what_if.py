@@ -280,7 +280,7 @@ def _judged(
             state.final = state.closed + 1  # none ahead: who acts at arrival spoke when the captured network let it
             ages.take(state.aged)
             yield from fates
-    ages.take(state.ages.untold(state.closed))
+    ages.take(state.ages.unreported(state.closed))
     for flight in state.in_flight():
         flight.cause = IN_FLIGHT
         yield flight

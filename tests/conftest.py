@@ -46,7 +46,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """What `make fuzz`, `make stats` and `make slow` choose; by default the share of them that `make test` has."""
     parser.addoption("--links-seed", type=int, default=1, help="of the networks and packets of tests/links")
     parser.addoption("--links-full", action="store_true", help="tests/links at full size, one failure in a million")
-    parser.addoption("--links-table", default="", help="the file that the figures of tests/links are written into")
     parser.addoption("--fuzz-payloads", type=int, default=100, help="payloads for each target of the fuzz tests")
     parser.addoption("--fuzz-seed", type=int, default=17, help="what the payloads are drawn from")
     parser.addoption("--fuzz-block", type=int, default=-1, help="bring the payloads of this block alone")

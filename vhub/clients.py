@@ -141,12 +141,12 @@ class Clients:
             return
         if session is not None and not session.boot and not hello.returns and known is not None and known.active:
             self._miss(hello.name, "", LOST_MEANWHILE)
-        self._sessions.hello(hello, build, self._deployment, self._state, self._said(hello.name))
+        self._sessions.hello(hello, build, self._deployment, self._state, self._last_sent(hello.name))
 
     def on_join(self, join: Join, now_ns: int) -> bool:
         """Note a client's join, which takes effect at a tick that suits it; a member is sent what it has missed.
 
-        Return whether somebody new takes part.
+        Return whether a new client takes part.
         """
         session = self._joining(join)
         if session is None or self._state is None:
@@ -155,7 +155,7 @@ class Clients:
             self.repeated += 1
             return False
         if join.period and not may_lockstep(self._state.deployment, join.name):
-            raise Malformed(f"{join.name} joins in lockstep, it is not declared so: the run would wait for it")
+            raise Malformed(f"{join.name} joins in lockstep, but is not declared lockstep")
         _check_timing(join)
         is_another = not (session.is_present or session.returns or join.period)
         self._sessions.catch_up(session, self.waits_for(join.name), now_ns)
@@ -177,11 +177,11 @@ class Clients:
             self.repeated += 1
             return
         if not self._sessions.admits(session, len(up.packets), len(payload)):
-            self._state.refuse_at_door("inbox_full", len(up.packets))
+            self._state.reject_on_receipt("inbox_full", len(up.packets))
             return
         repeated = session.take(up.packets)
         if repeated:
-            self._state.refuse_at_door("duplicate", repeated)
+            self._state.reject_on_receipt("duplicate", repeated)
             session.heard = 0  # acknowledge again: it does not know what is recorded
 
     def on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
@@ -209,13 +209,13 @@ class Clients:
         return client in self.waited
 
     def on_failure(self, failure: Failure, payload: bytes, now_ns: int) -> None:
-        """End the run for a player that reports its own failure: the run cannot go on without it."""
+        """End the run for a player that reports its own failure: the run cannot continue without it."""
         session = self._sessions.by_name.get(failure.name)
         if session is None or self._deployment is None or not session.may_fail(failure.boot):
             self.repeated += 1
             return
         if failure.name not in self._deployment.players:
-            raise Malformed(f"{failure.name} says that it has failed, it is no player")
+            raise Malformed(f"{failure.name} reports a failure; only players may")
         self._give_up(failure.reason)
 
     def _joining(self, join: Join) -> Session | None:
@@ -228,7 +228,7 @@ class Clients:
         if session is None or session.boot == join.boot or join.boot not in session.claims:
             return self._session(join)
         assert self._state is not None
-        if not self._sessions.take_over(join, self._state.deployment, self._state, self._said(join.name)):
+        if not self._sessions.take_over(join, self._state.deployment, self._state, self._last_sent(join.name)):
             return None
         known = self._state.members.get(join.name)
         if not session.returns and known is not None and known.active:
@@ -242,7 +242,7 @@ class Clients:
             return None
         return session
 
-    def _said(self, name: str) -> int | None:
+    def _last_sent(self, name: str) -> int | None:
         """Return the last downlink sent to a client: neither a Go without a Done nor one that is yet to be released."""
         member = None if self._state is None else self._state.members.get(name)
         if member is None or self._releases is None:
@@ -291,11 +291,11 @@ class Clients:
     def _back_ns(self, name: str) -> int:
         """Return for how long the run waits for a client that is away."""
         assert self._deployment is not None
-        is_started_again = may_restart(self._deployment, name) and not self._may_go_on_without(name)
+        is_started_again = may_restart(self._deployment, name) and not self._may_continue_without(name)
         return self._start_ns if is_started_again or not self.has_begun else self._deployment.deadlines.client_back_ns
 
-    def _may_go_on_without(self, name: str) -> bool:
-        """Whether the run goes on while a client is started again: in realtime, once it has begun."""
+    def _may_continue_without(self, name: str) -> bool:
+        """Whether the run continues while a client is restarted: in realtime, once it has begun."""
         assert self._deployment is not None
         is_realtime = self._releases is not None and self._releases.factor > 0
         return may_restart(self._deployment, name) and is_realtime and self.has_begun
@@ -321,7 +321,7 @@ class Clients:
         self._looked_ns = now_ns
 
     def wake(self, now_ns: int, *, holds: bool) -> None:
-        """Repeat Go, and end the run or go on without clients whose answer or return is overdue.
+        """Repeat Go, and end the run or continue without clients whose answer or return is overdue.
 
         Both deadlines are suspended while the run is paused. They begin anew while the vHub `holds`, which is when it
         waits for its supervisor: what closed that connection may have closed those of clients as well.
@@ -342,8 +342,8 @@ class Clients:
                 self._leave(name)
                 continue
             session.away_ns = -1  # its session stays: a tick may be waiting for it, and another process may come
-            if self._may_go_on_without(name):
-                self._go_on_without(name)
+            if self._may_continue_without(name):
+                self._continue_without(name)
             else:
                 self._give_up(lost(name, self._why_lost(session)))
 
@@ -355,7 +355,7 @@ class Clients:
             return f"it was not started again within {deployment.deadlines.start_ns / 1e9:g} s (deadlines.start)"
         return session.why_gone if session.boot else "it did not come back to the vHub"
 
-    def _go_on_without(self, name: str) -> None:
+    def _continue_without(self, name: str) -> None:
         """Have a player leave until its process is restarted: at the tick whose Done it owes, or at the next one."""
         self._sessions.joins.pop(name, None)
         self._sessions.by_name[name].answered()
@@ -423,7 +423,7 @@ def _check_timing(join: Join) -> None:
         acts = ", and acts at arrival" if join.arrivals else ""
         raise Malformed(f"{join.name} joins with an offset of {join.offset} ticks, its period is {join.period}{acts}")
     if join.arrivals and not join.period:
-        raise Malformed(f"{join.name} acts at arrival and joins free-running: only who is in lockstep can")
+        raise Malformed(f"{join.name} acts at arrival and joins free-running: acting at arrival needs lockstep")
     for item in join.arrivals:
         if item not in join.subscriptions:
             raise Malformed(f"{join.name} acts at the arrival of {item.source} {item.channel}, which it does not hear")

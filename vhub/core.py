@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from foosim.common import limits
 from foosim.common.errors import Malformed, Refused
+from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Log, Publish
@@ -66,9 +67,9 @@ from foosim.vhub.state.commits import Commits
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
 from foosim.vhub.state.resume import Past
-from foosim.vhub.status import HubStatistics, LinksTold, ShellStatus, report, report_before, statistics
+from foosim.vhub.status import HubStatistics, LinkLines, ShellStatus, report, statistics
 from foosim.vhub.wait_times import WaitTimes
-from foosim.vhub.watching import Watching
+from foosim.vhub.watching import WatchList
 from foosim.world.assembly.initial_state import first_chain
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
@@ -77,7 +78,7 @@ HubAction = Action | RecordClosing | RecordEpoch
 
 
 class _Step(Enum):
-    """How far the closing of a tick is behind its world phase."""
+    """How far the closing of a tick is after its world phase."""
 
     OPEN = 0
     """It waits for Dones."""
@@ -153,7 +154,7 @@ class HubCore:
         self.finished = False
         self.lost = self.failure = self.capture_file = ""
         self.shell = ShellStatus()
-        self.links_told, self.watching = LinksTold(), Watching()
+        self.link_lines, self.watching = LinkLines(), WatchList()
         self.busy = 0.0
         self.epoch = self._epoch_tick = self._end_ns = self._malformed = self._repeated = 0
         self.epoch_payload = b""
@@ -203,7 +204,7 @@ class HubCore:
         except Refused as error:
             self._malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
-                self.state.refuse_at_door("malformed")
+                self.state.reject_on_receipt("malformed")
             self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
@@ -290,8 +291,8 @@ class HubCore:
 
     @property
     def lacking(self) -> tuple[Channel, int]:
-        """The channel, and how many messages of it, without which no tick is closed; free-running clients wake nobody.
-        Where deliveries are final nobody waits for a closing: those ticks are closed together."""
+        """The channel, and how many messages of it, without which no tick is closed; messages of free-running
+        clients are not among them. Ticks whose deliveries are final already are closed together."""
         if self.state is None:
             return channels.COMMIT, 1
         if self.epoch == 0 or self.clients.waited:
@@ -385,7 +386,7 @@ class HubCore:
         return True
 
     def _release_closed(self, world: _World, sent_ns: int) -> None:
-        """Behind the deliveries, release to free-running clients what is due by now."""
+        """After the deliveries, release to free-running clients what is due by now."""
         state, releases = self.state, self.releases
         assert state is not None and releases is not None
         for name, flights in world.free.items():
@@ -396,7 +397,7 @@ class HubCore:
         world.step, world.sent_ns = _Step.RELEASED, sent_ns
 
     def _close_rest(self, world: _World) -> None:
-        """Judge what clients sent to clients, which nobody waits for, and hand the closing to the capture."""
+        """Judge the packets between clients, which no process waits for, and hand the closing to the capture."""
         state, releases, tick = self.state, self.releases, world.frame.tick
         assert state is not None and releases is not None
         world.closing.fates += state.close_rest()
@@ -422,8 +423,8 @@ class HubCore:
         factor = self.releases.factor
         text = self.waits.close(now_ns, int(self.state.tick_ns / factor / 2) if factor else limits.COUNTER_MAX)
         if text:
-            told = Heartbeat(channels.VHUB, self.state.closed + 1, self.epoch, text, self.lost, self.busy, b"")
-            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(told)))
+            late = Heartbeat(channels.VHUB, self.state.closed + 1, self.epoch, text, self.lost, self.busy, b"")
+            self.actions.append(Publish(channels.HEARTBEAT, channels.VHUB, encode(late)))
 
     def head(self) -> bytes:
         """Return the record with which a journal file starts: the state after the last closed tick."""
@@ -668,8 +669,8 @@ class HubCore:
     def _report(self, *, is_last: bool = False) -> bytes:
         refused, absences = self.refusals.by_sender(), {"boot": self.member.boot, **self.clients.absences.report()}
         if self.state is None or self.releases is None:
-            return report_before(refused)
-        links = self.links_told.lines(self.state, self.watching.links, anew=is_last)
+            return encode_json({"refused": refused})
+        links = self.link_lines.lines(self.state, self.watching.links, anew=is_last)
         parts = links, self.watching.report(self.state), absences, self.releases.lateness, self.shell
         return report(self.state, refused, *parts)
 

@@ -168,12 +168,12 @@ class HubShell:
 
     def stop(self) -> None:
         """Have the vHub leave journal and capture as they are; a signal handler may call this."""
-        self._why_abandoned = self._why_abandoned or "was told to end while the run goes on"
+        self._why_abandoned = self._why_abandoned or "was ordered to stop during the run"
 
     def _has_closed(self) -> bool:
         """Begin to close the capture once its queue has everything; return whether it is closed.
 
-        Until then the heartbeat goes on and reports the progress.
+        Until then heartbeats continue and report the progress.
         """
         capture, ended = self._capture, self.core.ended
         if capture is None:

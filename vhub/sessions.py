@@ -62,11 +62,11 @@ class Downlinks:
 
     def restore(self, downlinks: dict[str, list[tuple[int, bytes]]], now_ns: int) -> None:
         """Restore the downlinks of the vHub process before this one."""
-        for client, said in downlinks.items():
-            for number, payload in said:
+        for client, sent in downlinks.items():
+            for number, payload in sent:
                 self.keep(client, number, payload, now_ns)
 
-    def behind(self, client: str, received: int) -> Iterable[bytes]:
+    def after(self, client: str, received: int) -> Iterable[bytes]:
         """Return the downlinks with numbers above `received`, in order."""
         return [payload for _, number, payload in self._by_client.get(client, ()) if number > received]
 
@@ -405,7 +405,7 @@ class Sessions:
 
     def resend(self, name: str, number: int) -> None:
         """Send a client's downlinks from a number on: those that are journalled and may not have been sent."""
-        self._actions += [Publish(channels.DOWN, name, payload) for payload in self.downlinks.behind(name, number - 1)]
+        self._actions += [Publish(channels.DOWN, name, payload) for payload in self.downlinks.after(name, number - 1)]
 
     def send_down(self, name: str, down: Down, now_ns: int) -> None:
         """Send a client released packets outside of lockstep, or the end of the run, and keep the message."""
@@ -423,7 +423,7 @@ class Sessions:
         if session.is_behind:
             session.deadline_ns = now_ns + session.allowed_ns if waits else 0
             session.is_behind = False
-            missed = [*self.downlinks.behind(session.name, session.received), *([session.go] if waits else [])]
+            missed = [*self.downlinks.after(session.name, session.received), *([session.go] if waits else [])]
             self._actions += [Publish(channels.DOWN, session.name, payload) for payload in missed]
 
     def acknowledge(self, state: HubState, now_ns: int) -> None:

@@ -14,8 +14,8 @@ from foosim.vhub.links.fabric import LinkKey, name_of
 from foosim.vhub.network.ages import quantile
 from foosim.vhub.state.hub_state import HubState
 
-LINKS_TOLD_MAX: Final = 200
-LINKS_TOLD_EVERY: Final = 5
+LINKS_REPORTED_MAX: Final = 200
+LINKS_REPORTED_EVERY: Final = 5
 """Heartbeats, which are half a second."""
 
 
@@ -51,7 +51,7 @@ def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStat
     return HubStatistics(state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated)
 
 
-class LinksTold:
+class LinkLines:
     """The lines of links, which several heartbeats share: for hundreds of links they cost as much as a few ticks."""
 
     def __init__(self) -> None:
@@ -61,15 +61,10 @@ class LinksTold:
     def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> msgspec.Raw:
         """Return the lines as JSON for one more heartbeat, renewed when they are due: the links with the most traffic
         and those that are watched."""
-        if anew or self._heartbeats % LINKS_TOLD_EVERY == 0:
+        if anew or self._heartbeats % LINKS_REPORTED_EVERY == 0:
             self._lines = msgspec.Raw(encode_json(_links(state, watched)))
         self._heartbeats += 1
         return self._lines
-
-
-def report_before(refused: Mapping[str, Any]) -> bytes:
-    """Return the report of a vHub that has not joined a run yet."""
-    return encode_json({"refused": refused})
 
 
 def report(
@@ -87,7 +82,7 @@ def report(
     delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
     Ages at use are [channel, uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts
     messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,
-    null if none did. What somebody looks at is under `watched` (`Watching.report`).
+    null if none did. Watched links and readings are under `watched` (`WatchList.report`).
     """
     packets = state.packets
     return encode_json(
@@ -125,12 +120,12 @@ def _links(state: HubState, watched: Collection[tuple[str, str]]) -> list[list[A
             p50, p99 = (quantile(age.counts, share) * state.tick_ns for share in (0.5, 0.99))
             ages.setdefault(key, []).append((age.channel, sum(age.counts.values()), p50, p99))
     order = sorted(fabric.states.items(), key=lambda item: (-item[1].offered, item[0]))
-    told = order[:LINKS_TOLD_MAX] + [item for item in order[LINKS_TOLD_MAX:] if item[0][:2] in watched]
+    chosen = order[:LINKS_REPORTED_MAX] + [item for item in order[LINKS_REPORTED_MAX:] if item[0][:2] in watched]
     return [
         [
             *key[:2],
             *(its.offered, its.delivered, its.dropped, its.delay_ns // its.delivered if its.delivered else 0),
             *(key[2], fabric.queue_ns(key, now_ns), dict(sorted(its.causes.items())), ages.get(key, [])),
         ]
-        for key, its in sorted(told, key=lambda item: item[0])
+        for key, its in sorted(chosen, key=lambda item: item[0])
     ]

@@ -1,7 +1,7 @@
 """Accounts for the time that a closing waits for others, so that a late tick is attributed to who caused it.
 
 A closing waits for the nodes' samples once its commit has come, and for the clients' Dones once their Go has been sent.
-Time in which the vHub itself was busy counts for nobody else.
+Time in which the vHub itself was busy is attributed to no other process.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Keeps the last drops of links and the last readings of channels that viewers watch.
 
-Nothing is kept of what nobody looks at, and none of it is in the state, the journal or the capture: viewers do not
+Unwatched links and channels keep nothing, and none of it is in the state, the journal or the capture: viewers do not
 change a run.
 """
 
@@ -31,7 +31,7 @@ _NUMBER_BYTES: Final = 8
 Pair = tuple[str, str]
 
 
-class Watching:
+class WatchList:
     """The watched links and channels, with their last drops and readings."""
 
     def __init__(self) -> None:
@@ -67,8 +67,8 @@ class Watching:
 
         `drops` has for each link, `FROM>TO`, its last packets that were dropped, as rows of a capture without their
         payloads, oldest first; `readings` for each `ROBOT/CHANNEL` its last readings, [tick, [numbers]]; `asked` the
-        events that were asked of the network, [tick, event as JSON], and `here` the clients that take part, for who
-        explains the drops.
+        network events that were requested, [tick, event as JSON], and `here` the clients that take part, both for the
+        explanation of drops.
         """
         if not self.links and not self.readings:
             return {}
@@ -91,7 +91,7 @@ def _row(flight: Flight) -> bytes:
 def _newest(kept: Mapping[str, list[bytes]]) -> dict[str, list[msgspec.Raw]]:
     """Return the last of each that fit into an equal share of a report, in their order."""
     share = REPORT_BYTES_MAX // max(1, len(kept))
-    told: dict[str, list[msgspec.Raw]] = {}
+    newest: dict[str, list[msgspec.Raw]] = {}
     for name, contents in kept.items():
         left, chosen = share, []
         for content in reversed(contents):
@@ -99,5 +99,5 @@ def _newest(kept: Mapping[str, list[bytes]]) -> dict[str, list[msgspec.Raw]]:
             if left < 0:
                 break
             chosen.append(msgspec.Raw(content))
-        told[name] = chosen[::-1]
-    return told
+        newest[name] = chosen[::-1]
+    return newest

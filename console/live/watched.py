@@ -19,7 +19,7 @@ from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.source import Link
 from foosim.deployment.schema import Deployment
 from foosim.vhub.network.custom_models import model_versions
-from foosim.vhub.stages.told import Evidence
+from foosim.vhub.stages.explanation import Evidence
 from foosim.world.frame import Frame
 
 FRAMES_KEPT: Final = 64

@@ -16,7 +16,7 @@ from foosim.console.recorded.recording import Recording
 from foosim.console.shown.links import drop_message
 from foosim.console.shown.rule_text import RuleTexts
 from foosim.console.shown.timeline import Mark, Timeline
-from foosim.vhub.stages.told import Evidence
+from foosim.vhub.stages.explanation import Evidence
 
 SLICE_ROWS: Final = 500
 TOLD_MAX: Final = 1024

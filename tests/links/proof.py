@@ -1,36 +1,27 @@
-"""What a statistical test of a link asks of its run, and where its figures go.
+"""What a statistical test of a link asks of its run.
 
 `make test` runs with fixed seeds and small samples at ALPHA; `make stats` with a seed that it prints, the full samples,
-and an alpha of 1e-6 so that a hundred runs of the whole suite do not flake once. Each figure is a row of a table, which
-`make stats` writes (captures/network-validation.md).
+and an alpha of 1e-6 so that a hundred runs of the whole suite do not flake once.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Final, NoReturn
-
-import pytest
+from dataclasses import dataclass
+from typing import Final
 
 from tests.links.statistics import ALPHA, Z_ALPHA
 
 FULL_ALPHA: Final = 1e-6
 FULL_Z: Final = 4.89
 """A standard normal number is beyond it, on either side, with FULL_ALPHA."""
-HOLDS: Final = "holds"
-FAILS: Final = "**fails**"
-SKIPPED: Final = "skipped"
-Row = tuple[str, str, str, str, str, int, str]
-"""Test, what, statistic, measured, accepted, n, verdict."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Proof:
-    """The sizes and the acceptance of one run, and the rows of one test."""
+    """The sizes and the acceptance of one run."""
 
     seed: int
     is_full: bool
-    rows: list[Row] = field(default_factory=list)
 
     @property
     def alpha(self) -> float:
@@ -46,36 +37,29 @@ class Proof:
 
     def likely(self, test: str, what: str, p: float, n: int) -> None:
         """Accept a p-value."""
-        self._row(test, what, "p", f"{p:.3g}", f"> {self.alpha:g}", n, p > self.alpha)
+        self._accept(test, what, p > self.alpha, f"p {p:.3g}, accepted is > {self.alpha:g}", n)
 
     def normal(self, test: str, what: str, z: float, n: int) -> None:
         """Accept a deviation in standard deviations."""
-        self._row(test, what, "z", f"{z:+.2f}", f"within {self.z:.2f}", n, abs(z) < self.z)
+        self._accept(test, what, abs(z) < self.z, f"z {z:+.2f}, accepted is within {self.z:.2f}", n)
 
     def ratio(self, test: str, what: str, measured: float, expected: float, within: float, n: int) -> None:
         """Accept a figure that is off by no more than a share."""
-        off = measured / expected - 1.0
-        accepted = f"{expected:.5g} within {within:.2g}"
-        self._row(test, what, "ratio", f"{measured:.5g} ({off:+.2%})", accepted, n, abs(off) <= within)
+        holds = abs(measured / expected - 1.0) <= within
+        self._accept(test, what, holds, f"{measured:.5g}, accepted is {expected:.5g} within {within:.2g} of it", n)
 
     def within(self, test: str, what: str, measured: float, expected: float, off: float, n: int) -> None:
-        """Accept a figure that is off by no more than so much."""
+        """Accept a figure that is off by no more than an amount."""
         holds = abs(measured - expected) <= off
-        self._row(test, what, "figure", f"{measured:.4g}", f"{expected:.4g} within {off:.2g}", n, holds)
+        self._accept(test, what, holds, f"{measured:.4g}, accepted is {expected:.4g} within {off:.2g}", n)
 
     def below(self, test: str, what: str, measured: float, limit: float, n: int) -> None:
         """Accept a figure up to a limit."""
-        self._row(test, what, "figure", f"{measured:.4g}", f"at most {limit:.4g}", n, measured <= limit)
+        self._accept(test, what, measured <= limit, f"{measured:.4g}, accepted is at most {limit:.4g}", n)
 
     def exact(self, test: str, what: str, measured: object, expected: object, n: int) -> None:
         """Accept nothing but this."""
-        self._row(test, what, "exact", str(measured), str(expected), n, measured == expected)
+        self._accept(test, what, measured == expected, f"{measured}, accepted is {expected}", n)
 
-    def skip(self, test: str, what: str, reason: str) -> NoReturn:
-        """End a test that cannot be made here; the table says why."""
-        self.rows.append((test, what, "", f"skipped: {reason}", "", 0, SKIPPED))
-        pytest.skip(reason)
-
-    def _row(self, test: str, what: str, statistic: str, measured: str, accepted: str, n: int, holds: bool) -> None:
-        self.rows.append((test, what, statistic, measured, accepted, n, HOLDS if holds else FAILS))
-        assert holds, f"{test} {what}: {statistic} {measured}, accepted is {accepted} (n = {n}, seed {self.seed})"
+    def _accept(self, test: str, what: str, holds: bool, figure: str, n: int) -> None:
+        assert holds, f"{test} {what}: {figure} (n = {n}, seed {self.seed})"

@@ -18,11 +18,10 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
 from foosim.vhub.links.fabric import Fabric
-from foosim.vhub.network.draw_address import counts_within_channels
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.stages.told import Evidence
+from foosim.vhub.stages.explanation import Evidence
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import ENDS, Hub, deployment_of, rule
@@ -137,18 +136,6 @@ def test_a_sensor_that_is_heard_changes_no_other_row_where_links_share_nothing(n
         assert {address[2] for address in beside.keys() - usual.keys()} <= {"air", "radar", "temper"}
 
 
-@pytest.mark.parametrize("name", ["wifi_5_indoor", "zigbee"])
-def test_one_more_who_hears_a_broadcast_changes_nothing_for_the_others(name: str) -> None:
-    deployment = deployment_of(f"network.radios={{r: {{preset: {name}}}}}", "network.robots={'*': [r]}", PLACES)
-    found = []
-    for joined in (ENDS[:3], ENDS):
-        hub = hub_of(deployment, ["scan"], joined)
-        for tick in range(TICKS):
-            hub.close({}, robot_packets(tick, [("scan", "")]) if tick % 20 == 0 else [])
-        found.append(by_address([*hub.fates, *hub.state.in_flight()]))
-    assert not differing(*found) and len(found[0]) == 300 and len(found[1]) == 400
-
-
 SHARED: Final[dict[str, tuple[str, frozenset[str]]]] = {
     "order": (FREE.replace("free", "fifo"), frozenset({"due_ns", "arrival_tick", "fate"})),
     "a chain of bursts": (
@@ -217,17 +204,6 @@ def test_a_row_has_the_address_of_its_draws() -> None:
         assert explain_row(everything, packet_row(flight)).agrees
     changed = msgspec.structs.replace(packet_row(next(f for f in found.values() if f.count == 1)), count=0)
     assert explain_row(everything, changed).verdict.endswith("its draws are NOT those of the address in its row")
-
-
-def test_packets_are_counted_by_robot_and_channel() -> None:
-    """In the order of their robot's list, whichever channels and robots are in between."""
-
-    def packet(robot: str, channel: str) -> RobotPacket:
-        return RobotPacket(robot, 0, "", channel, b"")
-
-    sent = [("r", "a"), ("r", "b"), ("r", "a"), ("s", "a"), ("r", "a"), ("s", "b"), ("s", "a"), ("r", "b")]
-    assert counts_within_channels([packet(*one) for one in sent]) == [0, 0, 1, 0, 2, 0, 1, 1]
-    assert counts_within_channels([]) == []
 
 
 Order = Callable[[list[str]], list[str]]

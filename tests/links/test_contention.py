@@ -114,26 +114,6 @@ def test_the_fixed_point_solves_both_equations(n: int, window: int, doublings: i
     assert point.threshold == chance_threshold(p)
 
 
-@pytest.mark.parametrize("n", BIANCHI)
-def test_what_packets_of_saturated_stations_take(proof: Proof, n: int) -> None:
-    """Throughput within 3 % of the table, where a slot of backoff passes for all n at once; and what retries leave."""
-    p, rate, _, _ = BIANCHI[n]
-    packets, stations = proof.size(5_000, 50_000), f"Wi-Fi, {n:2} saturated stations: "
-    got = [wifi_access(words_of(k, proof.seed), n, 0, AIRTIME_NS, ACK_NS, WIFI_5) for k in range(packets)]
-    spent_ns = sum(access.occupancy_ns + access.backoff_ns * (1 - p) / n for access in got)
-    outcomes = Counter(access.outcome for access in got)
-    proof.ratio("T16", stations + "packets/s", outcomes["ok"] / spent_ns * 1e9, rate, 0.03, packets)
-    assert outcomes["collision"] + outcomes["ok"] == packets
-    if n > 1:
-        z = binomial_z(outcomes["collision"], packets, p**8)
-        if packets * p**8 > 10:  # below, a count is not normal
-            proof.normal("T16", stations + "lost after seven retries", z, packets)
-        retries = p * (1 - p**7) / (1 - p)
-        spread = sqrt(p / packets) / (1 - p)
-        mean = sum(access.retries for access in got) / packets
-        proof.normal("T16", stations + "retries", (mean - retries) / spread, packets)
-
-
 slot_by_slot = lru_cache(maxsize=1)(dcf.play)
 BEST_EFFORT = with_category(WIFI_5, CATEGORIES["best_effort"])
 
@@ -355,13 +335,6 @@ def test_attempts_have_their_own_words() -> None:
     assert failed.outcome == "error" and asked == [0, 1, 2, 3]
     windows = sum((16 << min(attempt, 6)) // 2 for attempt in (1, 3, 5, 7))
     assert failed.occupancy_ns == 8 * (34_000 + 1_000 + 16_000 + 1_000) and failed.backoff_ns == windows * 9_000
-
-
-def test_more_contenders_collide_more_and_none_are_too_many() -> None:
-    points = [contention(n, 16, 6) for n in range(1, CONTENDERS_MAX + 1)]
-    assert all(few.p < many.p and few.tau > many.tau for few, many in pairwise(points))
-    assert contention(10_000, 16, 6) == points[-1] and contention(0, 16, 6) == points[0]
-    assert all(0.0 <= point.collision_share <= 0.5 for point in points)
 
 
 # --- 802.15.4 --------------------------------------------------------------------------------------------------------

@@ -199,11 +199,3 @@ def test_channels_of_one_link_keep_their_order_behind_a_clog() -> None:
         due = {f.sequence: f.due_ns for f in (*hub.fates, *hub.state.in_flight())}
         found.append([due[number] for number in range(1, 91)])
     assert found[0] == found[1] == sorted(set(found[0]))
-
-
-def test_a_request_is_as_an_event_of_the_file() -> None:
-    """Apart from what it draws, which is by its own number."""
-    text = {"partition": [["a"], ["rest"]], "for": "20 ms"}
-    fabric = Fabric(deployment_of())
-    fabric.take(5, 10 * MS, Disrupt(json.dumps(text)).event)
-    assert [f.sent_ns // MS for f in fates(fabric, every(MS, 50)) if f.cause] == list(range(10, 30))

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections import Counter
 from itertools import groupby
 from math import sqrt
+from typing import Final
 
 import numpy as np
 import pytest
 
-from foosim.common.keyed_random import Slot
 from tests.links.offered import MS, every, fabric_of, fates, poisson_ns, uniforms
 from tests.links.proof import Proof
-from tests.links.statistics import binomial_p, binomial_z, chi_square, contingency
+from tests.links.statistics import binomial_p, binomial_z, chi_square, contingency, mean_and_deviation
 
 
 def losses(settings: str, n: int, seed: int) -> list[bool]:
@@ -35,11 +35,6 @@ def test_independent_loss_has_its_probability(proof: Proof, percent: float) -> N
     n = proof.size(100_000, 1_000_000)
     count = sum(losses(f"loss: {percent} %", n, proof.seed))
     proof.likely("T1", f"independent loss of {percent:g} % (exact binomial)", binomial_p(count, n, percent / 100), n)
-
-
-def test_independent_loss_has_its_cause() -> None:
-    causes = {flight.cause for flight in fates(fabric_of("loss: 50 %"), every(MS, 1000))}
-    assert causes == {"", "random_loss"}
 
 
 @pytest.mark.parametrize("by", ["size", "channel", "time of day", "time between packets", "the packet before"])
@@ -68,112 +63,64 @@ def test_loss_is_independent(proof: Proof, by: str) -> None:
     proof.likely("T2", f"loss against {by} (chi-squared)", contingency(table), n)
 
 
-def chain_z(lost: list[bool], loss: float, eigenvalue: float) -> float:
-    n = len(lost)
-    return (sum(lost) / n - loss) / sqrt(loss * (1 - loss) / n * (1 + eigenvalue) / (1 - eigenvalue))
+Chain = tuple[list[list[float]], list[float]]
+"""Steps between states, and the loss in each."""
 
 
-@pytest.mark.parametrize(
-    ("loss", "burst"), [(0.01, 4.0), (0.05, 3.0), (0.1, 5.0), (0.003, 1.33), (0.2, 1.5), (0.6, 1.5)]
-)
-def test_bursts_of_packets(proof: Proof, loss: float, burst: float) -> None:
-    """The mean loss, the mean length of losses in a row, and the law of these: geometric."""
-    n = proof.size(100_000, 1_000_000)
-    lost = losses(f"burst: {{loss: {100 * loss:g} %, mean_burst: {burst:g}}}", n, proof.seed)
-    r = 1 / burst
-    p = r * loss / (1 - loss)
-    what = f"{100 * loss:g} % in bursts of {burst:g}"
-    test = "T7" if burst == 1.33 else "T3"
-    proof.normal(test, f"{what}: mean loss", chain_z(lost, loss, 1 - p - r), n)
-    lengths = runs_of_losses(lost)
-    mean = sum(lengths) / len(lengths)
-    proof.normal("T4", f"{what}: mean burst", (mean - 1 / r) / (sqrt(1 - r) / (r * sqrt(len(lengths)))), len(lengths))
-    counts = Counter(lengths)
-    longest = max(counts)
-    expected = [len(lengths) * r * (1 - r) ** (k - 1) for k in range(1, longest + 1)]
-    tail = len(lengths) * (1 - r) ** longest
-    observed = [counts[k] for k in range(1, longest + 1)]
-    proof.likely("T5", f"{what}: law of bursts", chi_square([*observed, 0], [*expected, tail]), len(lengths))
+def two(p: float, r: float, h: float = 0.0, k: float = 1.0) -> Chain:
+    return [[1 - p, p], [r, 1 - r]], [1 - k, 1 - h]
 
 
-def test_bursts_that_lose_a_part(proof: Proof) -> None:
-    """In a bad state that loses 60 %, the mean loss and the mean losses in a row are still the configured ones."""
-    n, loss, burst, bad = proof.size(200_000, 1_000_000), 0.05, 1.8, 0.6
-    settings = f"burst: {{loss: {100 * loss} %, mean_burst: {burst}, bad_loss: {100 * bad} %}}"
-    lost = losses(settings, n, proof.seed)
-    share, r = loss / bad, 1 - (1 - 1 / burst) / bad
-    w = 1 - r - r * share / (1 - share)
-    # Var of a mean of Bernoulli(e x state): L(1-L) + 2 e^2 s(1-s) w/(1-w), all over n
-    variance = (loss * (1 - loss) + 2 * bad * bad * share * (1 - share) * w / (1 - w)) / n
-    proof.normal("T3", "5 % in bursts of 1.8 at 60 %: mean loss", (sum(lost) / n - loss) / sqrt(variance), n)
-    lengths = runs_of_losses(lost)
-    stay = 1 - 1 / burst
-    z = (sum(lengths) / len(lengths) - burst) / (sqrt(stay) * burst / sqrt(len(lengths)))
-    proof.normal("T4", "5 % in bursts of 1.8 at 60 %: mean burst", z, len(lengths))
+def bursts(loss: float, mean_burst: float, bad_loss: float = 1.0) -> Chain:
+    """The chain of two states with this mean loss and this mean number of losses in a row."""
+    share, r = loss / bad_loss, 1 - (1 - 1 / mean_burst) / bad_loss
+    return two(r * share / (1 - share), r, 1 - bad_loss)
 
 
-def test_the_expert_form_of_two_states(proof: Proof) -> None:
-    """p, r, h, k of netem's gemodel: the mean loss, and losses in a row by L / (L - P2)."""
-    n, p, r, h, k = proof.size(200_000, 1_000_000), 0.02, 0.25, 0.3, 0.99
-    settings = "gilbert_elliott: {p: 2 %, r: 25 %, h: 30 %, k: 99 %}"
-    lost = losses(settings, n, proof.seed)
-    bad, good_loss, bad_loss = p / (p + r), 1 - k, 1 - h
-    loss, w = bad * bad_loss + (1 - bad) * good_loss, 1 - p - r
-    spread = (bad_loss - good_loss) ** 2 * bad * (1 - bad) * w / (1 - w)
-    z = (sum(lost) / n - loss) / sqrt((loss * (1 - loss) + 2 * spread) / n)
-    proof.normal("T3", "gilbert_elliott p 2 %, r 25 %, h 30 %, k 99 %: mean loss", z, n)
-    both = (1 - bad) * good_loss * ((1 - p) * good_loss + p * bad_loss)
-    both += bad * bad_loss * (r * good_loss + (1 - r) * bad_loss)
-    lengths = runs_of_losses(lost)
-    mean = sum(lengths) / len(lengths)
-    deviation = sqrt(sum((x - mean) ** 2 for x in lengths) / (len(lengths) - 1))
-    z = (mean - loss / (loss - both)) / (deviation / sqrt(len(lengths)))
-    proof.normal("T4", "gilbert_elliott: mean burst", z, len(lengths))
+CHAINS: Final[dict[str, Chain]] = {
+    **{
+        f"burst: {{loss: {100 * loss:g} %, mean_burst: {burst:g}}}": bursts(loss, burst)
+        for loss, burst in ((0.01, 4.0), (0.05, 3.0), (0.1, 5.0), (0.003, 1.33), (0.2, 1.5), (0.6, 1.5))
+    },
+    "burst: {loss: 5 %, mean_burst: 1.8, bad_loss: 60 %}": bursts(0.05, 1.8, 0.6),
+    "gilbert_elliott: {p: 2 %, r: 25 %, h: 30 %, k: 99 %}": two(0.02, 0.25, 0.3, 0.99),
+    "loss: 5 %, gilbert_elliott: {p: 10 %, r: 50 %}": two(0.1, 0.5, 0.0, 0.95),
+    "markov4: {p13: 1 %, p31: 20 %, p32: 10 %, p23: 40 %, p14: 0.5 %}": (
+        [[0.985, 0, 0.01, 0.005], [0, 0.6, 0.4, 0], [0.2, 0.1, 0.7, 0], [1, 0, 0, 0]],
+        [0, 0, 1, 1],
+    ),
+}
+"""Of four states: good, a delivery within a burst, a burst, a single loss."""
 
 
-def stationary(steps: list[list[float]]) -> list[float]:
-    """The stationary distribution of a chain: it is left as it is by a step, and its sum is 1."""
-    stay = np.vstack([np.transpose(steps) - np.eye(len(steps)), np.ones(len(steps))])
-    return [*map(float, np.linalg.lstsq(stay, [0.0] * len(steps) + [1.0], rcond=None)[0])]
-
-
-def test_the_expert_form_of_four_states(proof: Proof) -> None:
-    """States 1 good, 2 a delivery within a burst, 3 a burst, 4 a single loss; lost are 3 and 4."""
-    n = proof.size(200_000, 1_000_000)
-    p13, p31, p32, p23, p14 = 0.01, 0.2, 0.1, 0.4, 0.005
-    settings = "markov4: {p13: 1 %, p31: 20 %, p32: 10 %, p23: 40 %, p14: 0.5 %}"
-    steps: list[list[float]] = [
-        [1 - p13 - p14, 0, p13, p14],
-        [0, 1 - p23, p23, 0],
-        [p31, p32, 1 - p31 - p32, 0],
-        [1, 0, 0, 0],
-    ]
-    share = stationary(steps)
-    loss = share[2] + share[3]
-    # the variance of the mean by the autocovariance of "lost", summed over lags
-    variance, at = loss * (1 - loss), [0.0, 0.0, share[2], share[3]]
+@pytest.mark.parametrize("settings", CHAINS)
+def test_bursts_of_packets(proof: Proof, settings: str) -> None:
+    """The mean loss, and the mean length of losses in a row, L / (L - P2); of two pure states their law: geometric."""
+    n, steps, of = proof.size(200_000, 1_000_000), *map(np.array, CHAINS[settings])
+    share = np.linalg.matrix_power(0.5 * (steps + np.eye(len(of))), 2**20)[0]
+    loss, at = float(share @ of), share * of
+    both = float(at @ steps @ of)
+    variance = loss * (1 - loss)  # of the mean: by the autocovariance of "lost", summed over lags
     for _ in range(2000):
-        at = [sum(at[i] * steps[i][j] for i in range(4)) for j in range(4)]
-        variance += 2 * (at[2] + at[3] - loss * loss)
+        at = at @ steps
+        variance += 2 * (float(at @ of) - loss * loss)
     lost = losses(settings, n, proof.seed)
-    proof.normal("T3", "markov4: mean loss", (sum(lost) / n - loss) / sqrt(variance / n), n)
+    proof.normal("T3", f"{settings}: mean loss", (sum(lost) / n - loss) / sqrt(variance / n), n)
+    lengths = runs_of_losses(lost)
+    mean, deviation = mean_and_deviation(lengths)
+    expected = loss / (loss - both)
+    proof.normal("T4", f"{settings}: mean burst", (mean - expected) / (deviation / sqrt(len(lengths))), len(lengths))
+    if [*of] == [0, 1]:
+        r, counts, longest = 1 / expected, Counter(lengths), max(lengths)
+        due = [len(lengths) * r * (1 - r) ** (k - 1) for k in range(1, longest + 1)]
+        seen = [counts[k] for k in range(1, longest + 1)]
+        p = chi_square([*seen, 0], [*due, len(lengths) * (1 - r) ** longest])
+        proof.likely("T5", f"{settings}: law of bursts", p, len(lengths))
 
 
-def test_single_losses_beside_bursts_add_up(proof: Proof) -> None:
-    """What a burst spares is lost independently: each has its own cause, and its own share."""
+def test_single_losses_beside_bursts_have_their_own_cause(proof: Proof) -> None:
     n = proof.size(100_000, 1_000_000)
     settings = "loss: 5 %, gilbert_elliott: {p: 10 %, r: 50 %}"
     causes = Counter(flight.cause for flight in fates(fabric_of(settings, proof.seed), every(MS, n)))
-    burst, spared = causes["burst_loss"], n - causes["burst_loss"]
+    spared = n - causes["burst_loss"]
     proof.normal("T3", "losses beside bursts", binomial_z(causes["random_loss"], spared, 0.05), n)
-    share, w = 1 / 6, 0.4
-    z = (burst / n - share) / sqrt(share * (1 - share) / n * (1 + w) / (1 - w))
-    proof.normal("T3", "bursts beside losses", z, n)
-
-
-def test_what_a_packet_draws_for_loss_is_uniform(proof: Proof) -> None:
-    n = proof.size(50_000, 1_000_000)
-    counts = [0] * 256
-    for flight in fates(fabric_of("loss: 1 %", proof.seed), every(MS, n)):
-        counts[flight.words[Slot.LOSS] >> 56] += 1
-    proof.likely("T1", "draws for loss are uniform (256 classes)", chi_square(counts, [n / 256] * 256), n)

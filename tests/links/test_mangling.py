@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from itertools import pairwise
 from math import comb, expm1, log1p, sqrt
 
 import pytest
 
-from foosim.protocol.messages import Sent
 from foosim.vhub.network.packet import Flight, content_of
-from tests.links.offered import ENDS, MS, Hub, deployment_of, every, fabric_of, fates, play, rule
+from tests.links.offered import MS, every, fabric_of, fates, play
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, chi_square
 
@@ -105,30 +103,3 @@ def test_copies_take_time_on_the_wire_and_have_a_fate_of_their_own(proof: Proof)
     assert all(f.due_ns == f.sent_ns + 7 * MS for f in twins if not f.cause)
     lost = sum(bool(f.cause) for f in twins)
     proof.normal("T15", "duplication: loss of copies is their own", binomial_z(lost, len(twins), 0.5), len(twins))
-
-
-def test_copies_count_against_the_rate(proof: Proof) -> None:
-    """A link that doubles everything has half of its rate left: of twice as much, half is lost in the queue."""
-    n = proof.size(4000, 40_000)
-    settings = "rate: 10 Mbit/s, duplicate: 100 %, queue: {packets: 10}"
-    flights = play(fabric_of(settings, proof.seed), [flight_of(k, k * MS) for k in range(n)])
-    sent = sorted(f.due_ns for f in flights if not f.cause)
-    proof.ratio("T15", "throughput with copies", (len(sent) - 1) / (sent[-1] - sent[0]), 1 / MS, 0.001, len(sent))
-    assert all(b - a == MS for a, b in pairwise(sent))
-
-
-def test_copies_are_in_no_account(proof: Proof) -> None:
-    """The hub: offered = delivered + dropped + in flight, and the copies beside."""
-    settings = "loss: 20 %, duplicate: 50 %, jitter: {shape: gamma, sd: 3 ms}, order: free"
-    hub = Hub(deployment_of(f"seed={proof.seed}", rule(settings, "from: '*', to: '*'")))
-    for tick in range(200):
-        hub.close({name: [Sent(tick + 1, "", "news", 0, b"x")] for name in ENDS})
-        packets = hub.state.packets
-        assert packets.in_flight == sum(f.copy == 0 for f in hub.state.in_flight())
-    copies = [f for f in hub.fates if f.copy] + [f for f in hub.state.in_flight() if f.copy]
-    assert packets.offered == 200 * 12 and packets.copies == len(copies) > 700
-    links = hub.state.fabric.states.values()
-    assert sum(link.offered for link in links) == packets.offered
-    assert sum(link.copies for link in links) == packets.copies
-    arrived = Counter((f.source, f.destination, f.sequence, f.copy) for f in hub.fates)
-    assert max(arrived.values()) == 1

@@ -18,10 +18,6 @@ def test_noise_floors(bandwidth_hz: float, figure_db: float, expected: float) ->
     assert noise_dbm(bandwidth_hz, figure_db) == pytest.approx(expected, abs=0.05)
 
 
-def test_without_interference_it_is_the_difference() -> None:
-    assert ratio_cdb(-7000, -9400, 0) == 2400
-
-
 def test_interference_adds_in_power() -> None:
     assert ratio_cdb(-7000, -9400, units_of(-9400)) == 2400 - round(1000 * log10(2))
     assert ratio_cdb(-7000, -9400, units_of(-8000)) == round(-100 * (70 + 10 * log10(1e-8 + 10**-9.4)))

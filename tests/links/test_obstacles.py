@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -128,14 +126,6 @@ def test_the_ends_own_bodies_are_no_obstacles(proof: Proof) -> None:
     crossed = [crossing.name for crossing in fabric.world.crossings(across["a"], across["b"], frozenset())]
     assert "red.goal" in crossed
     assert "red.goal" not in [c.name for c in fabric.world.crossings(across["a"], across["b"], frozenset(["red.goal"]))]
-
-
-@pytest.mark.parametrize("material", ["concrete", "brick", "wood", "chipboard"])
-def test_thicker_is_not_less(proof: Proof, material: str) -> None:
-    """For lossy slabs, in steps of twelve centimetres: reflections within a slab go up and down in shorter ones."""
-    losses: Sequence[int] = [loss_cdb(world(wall(material, f"{cm} cm"))) for cm in range(6, 66, 12)]
-    falls = sum(b < a for a, b in pairwise(losses))
-    proof.exact("T21", f"{material}: steps of 12 cm that take less", falls, 0, len(losses))
 
 
 def test_the_way_round_bounds_what_walls_take() -> None:

@@ -8,8 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
-from itertools import groupby
-from math import expm1, log1p, sqrt
+from math import sqrt
 from typing import Final
 
 import pytest
@@ -18,53 +17,11 @@ from foosim.common.keyed_random import draw_key
 from foosim.deployment.network.impairments import ParetoDwell
 from foosim.vhub.network.good_bad_periods import Episodes, pareto_with_mean
 from foosim.vhub.network.packet import Flight
-from tests.links.offered import MS, S, every, fabric_of, fates, uniforms
+from tests.links.offered import MS, S, every, fabric_of, fates
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, ks, ks_exponential
 
 Times = list[tuple[int, int]]
-
-
-def bad_times(settings: str, seed: int, period_ns: int, count: int, channel: str = "data") -> Times:
-    """First and last sending of each bad time that a periodic flow meets, the first and the last left out."""
-    flights = fates(fabric_of(settings, seed), every(period_ns, count), channel=channel)
-    met = [(flight.sent_ns, bool(flight.cause)) for flight in flights]
-    groups = [(bad, [at for at, _ in group]) for bad, group in groupby(met, key=lambda of: of[1])]
-    return [(times[0], times[-1]) for bad, times in groups[1:-1] if bad]
-
-
-def ends(own_ms: float, other_ms: float, step_ms: float = 1.0) -> float:
-    """The chance that a time with this mean is over at the next packet (a later one may have begun: it is not seen)."""
-    rate, other = 1 / own_ms, 1 / other_ms
-    return rate / (rate + other) * -expm1(-(rate + other) * step_ms)
-
-
-def exponential(counts: list[int], end: float, seed: int) -> float:
-    """The p-value of lengths that a periodic flow has seen as counts of packets, against the exponential law.
-
-    Seen at a period, the link is a chain of two states, and a count is geometric with `end`; a number of the same
-    exponential law within one period makes an exponential one of it.
-    """
-    mean = -1 / log1p(-end)
-    within = uniforms(len(counts), seed, "within a period")
-    return ks_exponential([n - 1 - mean * log1p(-u * end) for n, u in zip(counts, within, strict=True)], mean)
-
-
-def test_bad_times_are_exponential(proof: Proof) -> None:
-    """Lengths of bad times, 40 ms in the mean, seen by a flow of 1 kHz."""
-    n = proof.size(50_000, 1_000_000)
-    times = bad_times("burst: {loss: 50 %, mean_bad: 40 ms}", proof.seed, MS, n)
-    p = exponential([(last - first) // MS + 1 for first, last in times], ends(40, 40), proof.seed)
-    proof.likely("T6", "bad times of 40 ms: Kolmogorov against exponential", p, len(times))
-
-
-def test_good_times_are_exponential(proof: Proof) -> None:
-    n = proof.size(50_000, 1_000_000)
-    flights = fates(fabric_of("outages: {mean_on: 30 ms, mean_off: 10 ms}", proof.seed), every(MS, n))
-    groups = [(bad, sum(1 for _ in group)) for bad, group in groupby(bool(f.cause) for f in flights)]
-    counts = [count for bad, count in groups[1:-1] if not bad]
-    p = exponential(counts, ends(30, 10), proof.seed)
-    proof.likely("T6", "times without outages of 30 ms: Kolmogorov against exponential", p, len(counts))
 
 
 def scale_of(mean: float, alpha: float, top: float) -> float:
@@ -104,28 +61,6 @@ def test_lengths_are_of_their_laws(proof: Proof, dwell: ParetoDwell | None) -> N
     proof.normal("T6", "lengths of bad times by Pareto that are cut at 400 ms", z, len(bad))
 
 
-def test_heavy_tailed_bad_times(proof: Proof) -> None:
-    """Pareto lengths cut at the greatest: their mean as configured, and their law.
-
-    A length of x periods is met by floor(x) packets or one more; a golden sequence spreads counts over their period.
-    """
-    n, step_ms = proof.size(100_000, 1_500_000), 0.1
-    alpha, top, mean = 1.5, 400.0, 20.0
-    settings = "burst: {loss: 25 %, mean_bad: 20 ms, dwell: {alpha: 1.5, max: 400 ms}}"
-    times = bad_times(settings, proof.seed, MS // 10, n)
-    spread = [(0.5 + 0.6180339887 * k) % 1.0 * 2 * step_ms for k in range(len(times))]
-    lengths = [(last - first) / MS + more for (first, last), more in zip(times, spread, strict=True)]
-    scale = scale_of(mean, alpha, top)
-    square = alpha * scale * scale / (2 - alpha) * ((top / scale) ** (2 - alpha) - 1)
-    square += top * top * (scale / top) ** alpha
-    z = (sum(lengths) / len(lengths) - mean) / sqrt((square - mean * mean) / len(lengths))
-    proof.normal("T6", "bad times by Pareto, 1.5, up to 400 ms: their mean", z, len(lengths))
-    below = [length for length in lengths if length < 0.95 * top]
-    whole = 1 - (scale / (0.95 * top)) ** alpha
-    p = ks(below, lambda x: (1 - (scale / x) ** alpha) / whole if x > scale else 0.0)
-    proof.likely("T6", "bad times by Pareto: Kolmogorov", p, len(below))
-
-
 def test_two_flows_see_the_same_bad_times(proof: Proof) -> None:
     """10 Hz and 1 kHz on one link: each slow packet meets what the fast one at its time meets."""
     n = proof.size(30_000, 600_000)
@@ -152,6 +87,7 @@ def test_two_flows_on_one_link_in_turns() -> None:
     [
         ("burst: {loss: 5 %, mean_bad: 40 ms}", 0.05, 40.0),
         ("burst: {loss: 5 %, mean_bad: 40 ms, bad_loss: 50 %}", 0.05, 40.0),
+        ("burst: {loss: 25 %, mean_bad: 20 ms, dwell: {alpha: 1.5, max: 400 ms}}", 0.25, 100.0),
         ("outages: {mean_on: 300 ms, mean_off: 100 ms}", 0.25, 100.0),
         ("outages: {mean_on: 300 ms, mean_off: 100 ms}, loss: 20 %", 0.25 + 0.75 * 0.2, 100.0),
         ("outages: {mean_on: 300 ms, mean_off: 100 ms}, burst: {loss: 5 %, mean_bad: 40 ms, bad_loss: 50 %}",

@@ -322,7 +322,7 @@ def test_a_model_that_cannot_be_had_is_refused_at_its_place(tmp_path: Path, mode
 def test_two_packages_that_give_one_name(tmp_path: Path, foggy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(install(tmp_path / "other", name="mist", version="3")))
     deployment = load_deployment(network("model: {name: fog}"), "t.yaml")
-    with pytest.raises(DeploymentError, match=r"a link model of foggy 1\.2 and mist 3: which one is not said"):
+    with pytest.raises(DeploymentError, match=r"ambiguous: a link model of foggy 1\.2 and mist 3"):
         check_link_models(deployment.network, network("model: {name: fog}"), "t.yaml")
     assert model_versions(deployment.network) == {"link model fog": "foggy 1.2, mist 3"}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from math import inf, log, log10, pi, sqrt
 from typing import Final
@@ -14,7 +13,6 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.vhub.radio.materials import MATERIALS, slab_loss_db
 from foosim.vhub.radio.path_loss import (
     ENVIRONMENTS,
-    Environment,
     Itu1238,
     LogDistance,
     path_loss_db,
@@ -104,8 +102,6 @@ def test_log_distance_as_configured(proof: Proof) -> None:
     configured = LogDistance("", exponent=2.2, reference_loss_db=40.0, reference_distance_m=2.0)
     assert configured.los_db(20.0, 2.4e9, (1.0, 1.0)) == pytest.approx(62.0)
     assert configured.los_db(1.5, 2.4e9, (1.0, 1.0)) == 40.0
-    base = ENVIRONMENTS["log_distance"]
-    assert isinstance(base, LogDistance) and replace(base, sigma_los=4.0).exponent == 3.0
 
 
 @pytest.mark.parametrize(
@@ -117,25 +113,6 @@ def test_floors_of_a_building(site: str, n: int, floors_db: tuple[int, ...]) -> 
         itu = Itu1238("", site=site, floors=floors)  # type: ignore[arg-type]
         expected = 20 * log10(2400) + n * log10(25) + floor_db - 28
         assert itu.los_db(25.0, 2.4e9, (1.0, 1.0)) == pytest.approx(expected)
-
-
-def test_parameters_of_shadowing() -> None:
-    found = {name: (e.sigma_los, e.sigma_nlos, e.d_corr_los, e.d_corr_nlos) for name, e in ENVIRONMENTS.items()}
-    assert found["indoor"] == (3.0, 8.03, 10.0, 6.0)
-    assert found["v2v_urban"] == found["v2v_highway"] == (3.0, 4.0, 10.0, 13.0)
-    assert found["urban_micro"] == (4.0, 7.82, 10.0, 13.0) and found["urban_macro"] == (4.0, 6.0, 37.0, 50.0)
-    assert found["lora"] == (4.0, 4.0, 110.0, 110.0)
-    assert all(environment.source for environment in ENVIRONMENTS.values())
-
-
-def test_medians_of_the_presets() -> None:
-    """SNR at 10, 50 and 100 m: 2.4 GHz with 20 dBm, 5 GHz with 23 dBm, noise -94 dBm; 5.9 GHz, 23 dBm, -95 dBm."""
-    indoor, urban = ENVIRONMENTS["indoor"], ENVIRONMENTS["v2v_urban"]
-    h = (1.5, 1.5)
-    assert [round(114 - indoor.los_db(d, 2.437e9, h)) for d in (10, 50, 100)] == [57, 44, 39]
-    assert [round(114 - indoor.nlos_db(d, 2.437e9, h)) for d in (10, 50, 100)] == [49, 22, 10]
-    assert [round(117 - indoor.nlos_db(d, 5.25e9, h)) for d in (10, 50, 100)] == [43, 17, 5]
-    assert round(118 - urban.los_db(300, 5.9e9, h)) == 24 and round(118 - urban.nlos_db(100, 5.9e9, h)) == 7
 
 
 # --- obstacles -------------------------------------------------------------------------------------------------------
@@ -206,6 +183,7 @@ def test_antennas_above_the_vehicle_see_over_it() -> None:
 
 # --- materials -------------------------------------------------------------------------------------------------------
 
+
 TABLE: Final = {  # dB at 0.868, 2.44, 5.25 and 5.9 GHz, worked out from P.2040's coefficients, two digits
     ("concrete", 0.1): (4.8, 8.1, 13, 15),
     ("concrete", 0.2): (7.5, 15, 26, 28),
@@ -245,28 +223,20 @@ def multiple_echoes(material: str, thickness_m: float, f_ghz: float) -> float:
 def test_a_slab_is_the_sum_of_its_echoes(proof: Proof, material: str) -> None:
     """Another derivation with Fresnel's coefficients and the vacuum's permittivity."""
     off = []
-    for thickness_m, f_ghz in ((0.004, 2.4), (0.05, 5.9), (0.15, 0.868)):
+    for thickness_m, f_ghz in ((0.004, 2.4), (0.05, 5.9), (0.15, 0.868), (0.012, 5.25)):
         expected = multiple_echoes(material, thickness_m, f_ghz)
         off.append(abs(slab_loss_db(material, thickness_m, f_ghz * 1e9) - expected))
     proof.below("T18", f"P.2040, {material}: dB off the sum of its echoes", max(off), 0.02, len(off))
 
 
 def test_thicker_walls_of_what_absorbs_take_more() -> None:
+    assert slab_loss_db("metal", 0.001, 2.4e9) == slab_loss_db("metal", 5.0, 60e9) == 60.0, "it is capped"
     for material in ("concrete", "wet_ground", "plywood"):
         losses = [slab_loss_db(material, 0.05 * k, 5.9e9) for k in range(1, 200)]
         assert all(thin < thick for thin, thick in pairwise(losses)) and losses[-1] > 300.0
     for material in MATERIALS:
         assert slab_loss_db(material, 0.0, 2.4e9) == pytest.approx(0.0, abs=1e-9)
         assert all(slab_loss_db(material, 0.001 * k, 2.4e9) >= 0.0 for k in range(100))
-
-
-def test_metal_is_capped() -> None:
-    assert slab_loss_db("metal", 0.001, 2.4e9) == slab_loss_db("metal", 5.0, 60e9) == 60.0
-
-
-def test_an_environment_must_have_its_curve() -> None:
-    with pytest.raises(AssertionError):
-        Environment("none").los_db(1.0, 1e9, (1.0, 1.0))
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)

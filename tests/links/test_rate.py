@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterator
 from itertools import pairwise
 from math import exp, lgamma, log, sqrt
 from typing import Final
@@ -17,7 +16,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foosim.vhub.network.packet import Flight
 from tests.links.offered import MS, S, every, fabric_of, fates, poisson_ns
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z
@@ -61,10 +59,6 @@ def test_a_new_rate_holds_within_one_buffer(proof: Proof) -> None:
     rates = [(len(t) - 1) * 8 * SIZE / (t[-1] - t[0]) * S for t in (before, after)]
     proof.ratio("T13", "rate before a change", rates[0], 1e7, 0.001, len(before))
     proof.ratio("T13", "rate one buffer after a change", rates[1], 2e6, 0.001, len(after))
-
-
-def test_a_link_without_rate_takes_no_time() -> None:
-    assert all(f.due_ns == f.sent_ns for f in fates(fabric_of("loss: 0 %"), every(1, 1000), 60_000))
 
 
 # --- waiting ---------------------------------------------------------------------------------------------------------
@@ -131,48 +125,6 @@ def test_a_queue_is_bounded_in_bytes_and_time() -> None:
     by_time = list(fates(fabric_of(f"{RATE}, queue: {{wait: 2.5 ms}}"), [0] * 10, SIZE))
     assert [f.cause for f in by_time] == [""] * 3 + ["expired"] * 7
     assert [f.queue_ns for f in by_time[:4]] == [0, MS, 2 * MS, 3 * MS]
-
-
-def test_codel_bounds_the_standing_wait(proof: Proof) -> None:
-    """Offered 10 % too much, the tail of a long queue stands at its bound; CoDel drops ever more until it drains."""
-    n = proof.size(20_000, 100_000)
-    times = poisson_ns(n, 1100, proof.seed)
-    settings = RATE + ", queue: {{packets: 1000, drop: {}}}"
-    waits = {}
-    for drop in ("tail", "codel"):
-        flights = list(fates(fabric_of(settings.format(drop), proof.seed), times, SIZE))
-        waits[drop] = [f.queue_ns / MS for f in flights[n // 4 :] if not f.cause]
-        causes = {f.cause for f in flights}
-        assert causes == ({"", FULL} if drop == "tail" else {"", "queue_codel"})
-    mean = sum(waits["codel"]) / len(waits["codel"])
-    proof.ratio("T14", "standing wait of a full queue in ms, 1000 packets", max(waits["tail"]), 1000, 0.01, n)
-    proof.below("T14", "CoDel: mean wait in ms at a load of 1.1 that does not yield", mean, 100, n)
-
-
-def test_codel_keeps_who_yields_at_its_target(proof: Proof) -> None:
-    """A sender that speeds up until it loses a packet, and slows down then, finds half of its waits within 5 ms."""
-    n = proof.size(20_000, 100_000)
-    found: list[Flight] = []
-
-    def times_ns() -> Iterator[int]:
-        at_ns, before_ns, load = 0, 0, 0.9
-        for next_ns in poisson_ns(n, 1000, proof.seed):
-            at_ns += int((next_ns - before_ns) / load)
-            before_ns = next_ns
-            yield at_ns
-            load = load * 0.7 if found[-1].cause else load + 0.0001
-
-    for flight in fates(fabric_of(f"{RATE}, queue: {{drop: codel}}", proof.seed), times_ns(), SIZE):
-        found.append(flight)  # the sender looks at it before the next
-    assert {flight.cause for flight in found} == {"", "queue_codel"}
-    waits = sorted(flight.queue_ns / MS for flight in found if not flight.cause)
-    proof.below("T14", "CoDel: median wait in ms of who yields, target 5 ms", waits[len(waits) // 2], 5, n)
-
-
-def test_codel_leaves_a_short_queue_alone(proof: Proof) -> None:
-    n = proof.size(20_000, 200_000)
-    flights = fates(fabric_of(f"{RATE}, queue: {{drop: codel}}", proof.seed), poisson_ns(n, 500, proof.seed), SIZE)
-    proof.exact("T14", "CoDel: drops at a load of 0.5", sum(bool(f.cause) for f in flights), 0, n)
 
 
 class Codel:

@@ -12,7 +12,6 @@ from foosim.protocol.messages import Sent
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight, state_of
 from foosim.vhub.state.hub_state import HubState
-from foosim.vhub.state.send_order import SendOrder
 from foosim.world.frame import Frame
 from tests.links.offered import ENDS, Hub, deployment_of
 
@@ -94,21 +93,3 @@ def test_a_robots_packet_does_not_wait_for_a_broadcast_by_radio() -> None:
     assert state.packets.offered == 1, "the broadcast is not judged yet"
     assert [(flight.destination, flight.cause) for flight in state.close_rest()][-1] == ("red.goal", "")
     assert state.packets.offered == 1 + 3
-
-
-def test_drops_stand_in_the_order_of_sending() -> None:
-    def flight(number: int) -> Flight:
-        return Flight("a", "b", "data", number, 0, 0, b"")
-
-    sendings = SendOrder()
-    for number, now in enumerate((True, False, True, True, False)):
-        if now:
-            sendings.dropped.append(flight(number))
-        else:
-            sendings.defer([flight(number)])
-    sendings.arrived.append(flight(9))
-    with pytest.raises(AssertionError, match="not judged"):
-        sendings.fates()
-    for flights, dropped in sendings.take_waiting():
-        dropped.extend(flights)
-    assert [found.sequence for found in sendings.fates()] == [0, 1, 2, 3, 4, 9]

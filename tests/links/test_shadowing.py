@@ -137,10 +137,6 @@ def test_it_is_continuous() -> None:
             assert field(KEY, y, x - 1e-9, D_CORR) == pytest.approx(field(KEY, y, x, D_CORR), abs=1e-6)
 
 
-def test_no_deviation_no_shadow() -> None:
-    assert shadowing_db(KEY, (1.0, 2.0), (3.0, 4.0), 0.0, 10.0) == 0.0
-
-
 def test_values_are_the_same_in_every_version() -> None:
     """A capture's fates follow from them."""
     assert shadowing_db(KEY, (1.5, -2.0, 0.4), (12.0, 7.0, 2.0), 3.0, 10.0) == pytest.approx(

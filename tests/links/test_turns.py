@@ -9,12 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.common.keyed_random import UNIT
 from foosim.protocol.messages import Sent
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import wifi_ack_ns
-from foosim.vhub.radio.contention import TURNS_SAVED, contention, wifi_access
 from foosim.vhub.radio.timings import WIFI_5
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.assembly.initial_state import initial_frame
@@ -102,27 +100,3 @@ def test_a_packet_that_comes_in_between_puts_off_the_others() -> None:
         flights.append(flight)
         before = {(known.source, known.sequence): known.air_end_ns for known in flights}
     assert shifts and shifts <= {-k for k in range(WIFI_5.slot_ns + 1)}, "less a slot, or what was left of one"
-
-
-@pytest.mark.parametrize("n", [2, 3, 8, 20])
-def test_a_collision_is_one_of_two(n: int) -> None:
-    """Who doubles its window waits with whom it collided with, beside n - 1 who contend without it: a lone one sends in
-    2 of 17 slots. Errors keep nobody else away, and a window that doubles but once none for long."""
-    point, first, second, third = contention(n, 16, 6), 3, 17, 40
-    fractions = {1: 3 / 16, 2: 17 / 32, 3: 40 / 64}
-    drawn = [int(fractions[k] * UNIT) for k in (1, 2, 3)]
-
-    def counted(fails: int, per: int) -> float:
-        """Slots, of a packet whose first two attempts fail and whose third gets across."""
-        blocks = (drawn[0], fails, 0, 0, drawn[1], fails, 0, 0), (drawn[2], UNIT - 1, UNIT - 1, 0, 0, 0, 0, 0)
-        return wifi_access(lambda block: blocks[block], n, per, 136_000, 28_000, WIFI_5).backoff_ns / 9_000
-
-    others = 1 - (1 - contention(n - 1, 16, 6).tau) ** (n - 1)
-    assert point.busy_without == pytest.approx(others) and (n > 2 or others == pytest.approx(2 / 17))
-    longer = (others * 214 + (1 - others) * 9) / (point.p * 214 + (1 - point.p) * 9)
-    assert 1.02 < longer < 1.1
-    assert counted(UNIT - 1, UNIT - 1) == pytest.approx(first + (second + third) * longer, abs=1e-3)
-    spared = 2 * TURNS_SAVED / ((n - 1) * point.tau)
-    assert counted(0, 0) == pytest.approx(first + (second + third) * longer - spared, abs=1e-3)
-    voice = contention(n, 4, 1)
-    assert voice.busy_without == voice.p and voice.quiet_slots == 0.0

@@ -16,7 +16,7 @@ from foosim.common import limits
 from foosim.deployment.network.rules import EVENTS_MAX
 from foosim.deployment.schema import Deployment
 from foosim.supervisor.records import ANSWERS_KEPT
-from foosim.vhub.line_of_sight.occlusion import PAIRS_KEPT, Sight
+from foosim.vhub.line_of_sight.occlusion import Sight
 from foosim.vhub.network.memory import AirState, LinkState, RadioState
 from foosim.vhub.radio.propagation import LOSS_MAX_DB
 from foosim.vhub.radio.shadowing import CELLS_KEPT
@@ -31,8 +31,6 @@ BOUNDS: Final[Mapping[str, int]] = {
     "RunState.recovered": 64 * limits.RECOVERIES_PER_COMMIT_MAX,  # of the whole run: it is in the result
     "Releases._anchors": 1 << 14,  # a second of commits, at the highest pace
     "Lags.cells": 1 << 13,
-    "_Memory._newer": PAIRS_KEPT,
-    "_Memory._older": PAIRS_KEPT,
     "Propagation._ways": limits.CLIENTS_MAX,  # pairs of sender and receiver
     "Propagation._places": limits.CLIENTS_MAX,
     "Propagation._reaches": LOSS_MAX_DB + 1,  # of fixed length

@@ -7,18 +7,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.network.rules import Event, Network
+from foosim.deployment.network.rules import Event
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.network.timeline import Timeline
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Disrupt
@@ -126,26 +124,3 @@ def test_a_heal_lets_go_what_a_clog_without_an_end_holds() -> None:
         (40 * TICK_NS, 40),
         (50 * TICK_NS, 50),
     ]
-
-
-def timeline(*events: Mapping[str, Any]) -> Timeline:
-    network = Network.model_validate({"events": list(events)})
-    return Timeline(network, 1, ["a", "b"])
-
-
-CUT: Final = {"partition": [["a"], ["b"]]}
-
-
-def test_of_one_moment_a_later_event_is_not_healed_by_an_earlier_one() -> None:
-    assert timeline({"at": "1 s", "heal": "all"}, {"at": "1 s", **CUT}).cuts_of("a", "b") == [(10**9, 2**62)]
-    assert timeline({"at": "1 s", **CUT}, {"at": "1 s", "heal": "all"}).cuts_of("a", "b") == [(10**9, 10**9)]
-
-
-@pytest.mark.parametrize("kind", ["all", "partitions"])
-def test_the_next_heal_of_its_kind_ends_what_lasts(kind: str) -> None:
-    made = timeline(
-        {"at": "1 s", **CUT}, {"at": "2 s", "heal": "clogs"}, {"at": "3 s", "heal": kind}, {"at": "4 s", "heal": "all"}
-    )
-    assert made.cuts_of("a", "b") == [(10**9, 3 * 10**9)]
-    made.add(Event.model_validate({"at": "2 s", "heal": "all"}))
-    assert made.cuts_of("a", "b") == [(10**9, 2 * 10**9)]

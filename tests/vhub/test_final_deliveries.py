@@ -9,7 +9,6 @@ from foosim.common import limits
 from foosim.deployment.loader import apply_sets
 from foosim.protocol import channels
 from foosim.protocol.messages import ClientHello, Epoch, Join, Subscription, Want
-from foosim.vhub.state.hub_state import HubState
 from tests.vhub.test_sessions import BUILD, DEPLOYMENT, FRAME, OWNERS, PERIODS, TEXT, Hub, sent
 
 W = limits.RELEASE_AHEAD
@@ -93,15 +92,6 @@ def test_they_are_no_more_than_the_supervisor_lets_nodes_go() -> None:
     hub.done("hand", 0)
     hub.done("knee", 0)
     assert covered(hub) == [(1, 1 + W)]
-
-
-def test_they_are_part_of_the_state() -> None:
-    hub = Hub().begin()
-    hub.close(0)
-    hub.close(1)
-    again = HubState.restore(hub.state.deployment, hub.state.snapshot())
-    assert (again.final, again.was_final, again.hears_clients) == (5, True, False)
-    assert again.snapshot() == hub.state.snapshot()
 
 
 def test_they_end_at_ticks_that_offsets_say_and_where_an_absent_client_may_join() -> None:

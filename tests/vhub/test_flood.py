@@ -14,6 +14,7 @@ from foosim.protocol.messages import Deliveries, Sent, Up
 from foosim.runtime.journal import Journal
 from foosim.vhub.state.records import fold
 from foosim.world.robot_packets import RobotPacket
+from tests.links.offered import Hub, deployment_of
 from tests.vhub.conftest import Driver, HubRun
 
 if TYPE_CHECKING:
@@ -104,3 +105,14 @@ def test_a_flood_costs_others_no_packet() -> None:
         numbers = [packet.sequence for packet in heard if packet.source == name]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
         assert len(numbers) == limits.CLIENT_BYTES_PER_TICK_MAX // 2 // limits.PACKET_HEAD_BYTES_MAX
+
+
+def test_a_flood_of_broadcasts_is_refused_from_a_bound_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each subscriber of the channel is one offered packet; a channel without subscribers offers none."""
+    monkeypatch.setattr(limits, "PACKETS_PER_MESSAGE_MAX", 10)
+    hub = Hub(deployment_of(), joined=("a", "b", "c"))
+    offered = []
+    for numbers, channel in ((range(1, 9), "news"), (range(9, 13), "news"), (range(13, 30), "unheard")):
+        hub.close({"a": [Sent(number, "", channel, 0, b"here") for number in numbers]})
+        offered.append(hub.state.packets.offered)
+    assert offered == [10, 18, 18] and hub.state.refusals == {"broadcast_full": 3}, "each tick begins anew"

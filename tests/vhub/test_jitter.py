@@ -1,27 +1,28 @@
-"""Quantiles of jitter: against closed forms and printed tables, and interpolated in whole nanoseconds."""
+"""Quantiles of jitter: those of the law over all shapes, interpolated in whole nanoseconds, with exact operations."""
 
 from __future__ import annotations
 
 import ast
 import inspect
 from itertools import pairwise
-from math import exp, log, log1p, sqrt
-from statistics import NormalDist
-from typing import Final
+from math import log1p, sqrt
+from typing import Any, Final
 
+import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
-from foosim.common.keyed_random import Slot, draw_key, draw_words
-from foosim.deployment.network.impairments import ParetoJitter
 from foosim.vhub.network import jitter, series_math
+from foosim.vhub.network.jitter import _ANY_JITTER as ANY_JITTER
 from foosim.vhub.network.jitter import (
     CELLS,
+    FIRST,
+    GAMMA_HALVES,
     HALF_CELLS,
     HALVES,
     TAIL_CELL,
-    _lomax_scale,
     gamma_quantiles_ns,
     interpolate_ns,
     moments_ns,
@@ -29,12 +30,6 @@ from foosim.vhub.network.jitter import (
 )
 
 S: Final = 1_000_000_000
-TAIL: Final = 1.0 - 2.0**-20
-COUNT: Final = 20_000
-
-
-def share(cell: int) -> float:
-    return min(max(cell / CELLS, 2.0**-20), TAIL)
 
 
 def moments(quantiles: tuple[int, ...]) -> tuple[float, float]:
@@ -52,147 +47,84 @@ def moments(quantiles: tuple[int, ...]) -> tuple[float, float]:
     return mean, sqrt(square - mean * mean)
 
 
-def test_as_wide_as_its_mean_it_is_exponential() -> None:
-    """Shape 1: the quantile is -ln(1 - p)."""
-    quantiles = gamma_quantiles_ns(S, S)
-    for cell in range(CELLS):
-        assert quantiles[cell] == pytest.approx(-log1p(-share(cell)) * S, abs=1.0, rel=1e-9)
-    assert quantiles[CELLS] == pytest.approx(-log1p(-TAIL) * S, rel=1e-7)
+def aboves(quantiles: tuple[int, ...]) -> list[float]:
+    """The probability of more than each quantile: even cells, or ever finer ones in a heavy tail."""
+    if len(quantiles) == CELLS + 1:
+        return [1 - FIRST, *(1 - cell / CELLS for cell in range(1, CELLS)), FIRST]
+    halves = (len(quantiles) - 1 - TAIL_CELL) // HALF_CELLS
+    fine = [2.0 ** -(4 + half) * (1 - place / 2 / HALF_CELLS) for half in range(halves) for place in range(HALF_CELLS)]
+    return [1 - FIRST, *(1 - cell / CELLS for cell in range(1, TAIL_CELL)), *fine, 2.0 ** -(4 + halves)]
 
 
-@pytest.mark.parametrize("stages", [4, 9, 16, 100])
-def test_with_a_whole_shape_it_is_erlangs_distribution(stages: int) -> None:
-    """P(n, x) = 1 - e^-x (1 + x + ... + x^(n-1) / (n-1)!): a sum that shares nothing with the series in the code."""
-    mean = 60 * S
-    quantiles = gamma_quantiles_ns(mean, mean // round(sqrt(stages)))
-    assert mean % round(sqrt(stages)) == 0
-    for cell in range(0, CELLS + 1, 16):
-        x = quantiles[cell] / mean * stages
-        term = total = 1.0
-        for n in range(1, stages):
-            term *= x / n
-            total += term
-        assert 1.0 - exp(-x) * total == pytest.approx(share(cell), abs=1e-9), cell
-
-
-PRINTED: Final = {  # Abramowitz and Stegun, table 26.8: chi-squared with nu degrees of freedom
-    1: {0.5: 0.454936, 0.75: 1.32330},
-    2: {0.25: 0.575364, 0.5: 1.38629, 0.75: 2.77259},
-    5: {0.25: 2.67460, 0.5: 4.35146, 0.75: 6.62568},
-    10: {0.25: 6.73720, 0.5: 9.34182, 0.75: 12.5489},
-    30: {0.25: 24.4776, 0.5: 29.3360, 0.75: 34.7998},
-}
-
-
-@pytest.mark.parametrize("freedom", PRINTED)
-def test_it_agrees_with_printed_tables(freedom: int) -> None:
-    """Chi-squared with nu degrees of freedom is gamma with mean nu and variance 2 nu."""
-    quantiles = gamma_quantiles_ns(freedom * S, round(sqrt(2 * freedom) * S))
-    for p, value in PRINTED[freedom].items():
-        assert quantiles[round(p * CELLS)] / S == pytest.approx(value, rel=5e-6)
+def gamma(mean_ns: int, sd_ns: int) -> Any:
+    return stats.gamma((mean_ns / sd_ns) ** 2, scale=sd_ns**2 / mean_ns)
 
 
 @pytest.mark.parametrize("mean_ns", [1_000, 300_000, 60 * S])
-@pytest.mark.parametrize("ratio", [0.01, 0.03, 0.1, 0.5, 1.0, 2.0, 3.0])
-def test_mean_and_spread_are_what_is_configured(mean_ns: int, ratio: float) -> None:
+@pytest.mark.parametrize("ratio", [0.01, 0.1, 0.5, 1.0, 2.0, 3.0])
+def test_a_gamma_table_has_the_quantiles_and_the_moments_of_its_law(mean_ns: int, ratio: float) -> None:
     """From the narrowest to the widest that a deployment may have; wide ones have a finer tail."""
     sd_ns = round(mean_ns * ratio)
-    quantiles = gamma_quantiles_ns(mean_ns, sd_ns)
-    assert quantiles[0] >= 0 and all(low <= high for low, high in pairwise(quantiles))
-    mean, sd = moments(quantiles)
-    found_mean, found_sd = moments_ns(quantiles)
+    quantiles, law = gamma_quantiles_ns(mean_ns, sd_ns), gamma(mean_ns, sd_ns)
+    assert len(quantiles) == (CELLS + 1 if ratio <= 1 else TAIL_CELL + GAMMA_HALVES * HALF_CELLS + 1)
+    assert quantiles == pytest.approx(law.isf(aboves(quantiles)), rel=2e-5, abs=1.0)
+    (mean, sd), (found_mean, found_sd) = moments(quantiles), moments_ns(quantiles)
     assert found_mean == pytest.approx(mean, rel=1e-4, abs=1.0) and found_sd == pytest.approx(sd, rel=1e-3, abs=1.0)
-    assert mean == pytest.approx(mean_ns, rel=0.0005, abs=0.6)
-    assert sd == pytest.approx(sd_ns, rel=0.005, abs=1.0)
+    assert mean == pytest.approx(mean_ns, rel=0.0005, abs=0.6) and sd == pytest.approx(sd_ns, rel=0.005, abs=1.0)
 
 
-def test_a_narrow_one_is_nearly_normal() -> None:
-    quantiles = gamma_quantiles_ns(S, S // 100)
-    for cell in (512, 2048, 3584):
-        normal = NormalDist(1.0, 0.01).inv_cdf(cell / CELLS)
-        assert quantiles[cell] / S == pytest.approx(normal, abs=1e-4)
+def lomax(mean: float, alpha: float, top: float) -> Any:
+    """A Lomax law whose mean, cut at `top`, is `mean`."""
+    low, high = 0.0, 1e6 * top
+    for _ in range(300):
+        scale = (low + high) / 2
+        found = scale / (alpha - 1) * -np.expm1((1 - alpha) * log1p(top / scale))
+        low, high = (scale, high) if found < mean else (low, scale)
+    return stats.lomax(alpha, scale=scale)
 
 
-def test_it_scales() -> None:
-    one, thousand = gamma_quantiles_ns(300_000, 200_000), gamma_quantiles_ns(300_000_000, 200_000_000)
-    assert all(abs(1000 * low - high) <= 501 for low, high in zip(one, thousand, strict=True))
+LAWS: Final[dict[str, tuple[dict[str, Any], Any, float, float]]] = {
+    "uniform": ({"width": "4 ms"}, stats.uniform(0, 4), 0.0, 4.0),
+    "lognormal": (
+        {"mean": "4 ms", "sd": "1 ms"}, stats.lognorm(sqrt(log1p(1 / 16)), scale=4 / sqrt(1 + 1 / 16)), 0.0, 1e9,
+    ),
+    "shifted_exp": ({"min": "2 ms", "mean": "5 ms"}, stats.expon(scale=5), 2.0, 1e9),
+    **{
+        f"pareto {alpha}, {top:g} ms": (
+            {"mean": f"{mean} ms", "alpha": alpha, "max": f"{top} ms"}, lomax(mean, alpha, top), 0.0, top,
+        )
+        for mean, alpha, top in ((2, 1.05, 60_000), (2, 1.2, 10_000), (2, 2.0, 3_000), (1_000, 1.5, 3_000), (2, 20, 12))
+    },
+}  # fmt: skip
+"""As written, with the law in ms, and what it is cut to."""
 
 
-# --- interpolation ---------------------------------------------------------------------------------------------------
-
-
-@settings(max_examples=300)
-@given(word=st.integers(0, 2**64 - 1))
-def test_interpolation_is_linear_within_the_cell_and_whole(word: int) -> None:
-    quantiles = gamma_quantiles_ns(300_000, 300_000)
-    cell, rest = divmod(word, 2**52)
-    low, high = quantiles[cell], quantiles[cell + 1]
-    value = interpolate_ns(quantiles, word)
-    assert type(value) is int and low <= value <= high
-    assert value == low + (high - low) * rest // 2**52
-
-
-def test_the_ends_of_a_cell_are_its_quantiles() -> None:
-    quantiles = gamma_quantiles_ns(300_000, 300_000)
-    for cell in (0, 1, 2047, CELLS - 1):
-        assert interpolate_ns(quantiles, cell << 52) == quantiles[cell]
-        last = interpolate_ns(quantiles, (cell + 1 << 52) - 1)
-        assert quantiles[cell + 1] - 1 <= last <= quantiles[cell + 1]
-    assert interpolate_ns(quantiles, 2**64 - 1) <= quantiles[CELLS]
-
-
-def test_a_heavy_tail_is_finer_the_rarer_it_is() -> None:
-    """Each quantile where its probability is, whole and linear between; rarer than 2^-52 there is nothing."""
-    law = ParetoJitter.model_validate({"shape": "pareto", "mean": "1 us", "alpha": 1.2, "max": "60 s"})
-    quantiles = quantiles_ns(law)
+@pytest.mark.parametrize("name", LAWS)
+def test_a_heavy_tailed_table_has_the_quantiles_of_its_law(name: str) -> None:
+    settings, law, least, most = LAWS[name]
+    quantiles = quantiles_ns(ANY_JITTER.validate_python({"shape": name.split(maxsplit=1)[0], **settings}))
     assert len(quantiles) == TAIL_CELL + HALVES * HALF_CELLS + 1
-    for cell in (0, 1, TAIL_CELL - 1, TAIL_CELL):
-        assert interpolate_ns(quantiles, cell << 52) == pytest.approx(quantiles[cell], abs=1)
-    for half in range(HALVES):
-        whole = 2 ** (60 - half)
-        for place in (0, 1, 40, 63):
-            at = TAIL_CELL + half * HALF_CELLS + place
-            step = whole // 2 // HALF_CELLS
-            word = 2**64 - 1 - (whole - place * step) + (place == 0)
-            assert quantiles[at] <= interpolate_ns(quantiles, word) <= quantiles[at] + quantiles[at + 1] // step + 1
-            middle = interpolate_ns(quantiles, word + step // 2)
-            assert middle == pytest.approx((quantiles[at] + quantiles[at + 1]) / 2, rel=0.02, abs=1)
-    assert interpolate_ns(quantiles, 2**64 - 1) == quantiles[-1] == 60 * S
+    expected = np.clip(law.isf(aboves(quantiles)), least, most) * 1e6
+    assert quantiles == pytest.approx(expected, rel=0.02, abs=1.0)
+    sure = None if name != "lognormal" else -15 * HALF_CELLS  # rarer than 2^-37 a normal number has few bits
+    assert quantiles[:sure] == pytest.approx(expected[:sure], rel=1e-6, abs=1.0)
 
 
-@pytest.mark.parametrize(
-    ("mean", "alpha", "top"),
-    [
-        ("1 us", 1.2, "60 s"),
-        ("1 us", 2.5, "60 s"),
-        ("2 ms", 1.05, "60 s"),
-        ("2 ms", 1.2, "10 s"),
-        ("2 ms", 2.0, "3 s"),
-        ("1 s", 1.5, "3 s"),
-        ("1 s", 5.0, "60 s"),
-    ],
-)
-def test_a_pareto_law_cut_anywhere_has_its_moments(mean: str, alpha: float, top: str) -> None:
-    """Against the integrals of the cut law, with tails from nearly none to nearly no mean."""
-    law = ParetoJitter.model_validate({"shape": "pareto", "mean": mean, "alpha": alpha, "max": top})
-    found_mean, found = moments_ns(quantiles_ns(law))
-    scale = _lomax_scale(law.mean_ns, alpha, law.max_ns)
-    u = 1 + law.max_ns / scale
-    by_two = log(u) if alpha == 2.0 else (u ** (2 - alpha) - 1) / (2 - alpha)
-    square = 2 * scale * scale * (by_two - (1 - u ** (1 - alpha)) / (alpha - 1))
-    assert found_mean == pytest.approx(law.mean_ns, rel=1e-3)
-    assert found == pytest.approx(sqrt(square - law.mean_ns**2), rel=2e-3)
-
-
-def test_drawn_jitter_has_the_distribution() -> None:
-    """Chi-squared over 64 cells of equal probability, 99.9 %, and the mean within 3.29 standard errors."""
-    quantiles, key = gamma_quantiles_ns(300_000, 300_000), draw_key(1, "link", "a", "b")
-    drawn = [interpolate_ns(quantiles, draw_words(key, number)[Slot.JITTER]) for number in range(COUNT)]
-    counts = [0] * 64
-    for value in drawn:
-        counts[min(63, int((1.0 - exp(-value / 300_000)) * 64))] += 1
-    assert sum((count - COUNT / 64) ** 2 / (COUNT / 64) for count in counts) < 103.44
-    assert abs(sum(drawn) / COUNT - 300_000) < 3.29 * 300_000 / sqrt(COUNT)
+@given(word=st.one_of(st.integers(0, 2**64 - 1), st.integers(0, 2**60).map(lambda rest: 2**64 - 1 - rest)))
+def test_interpolation_is_linear_within_its_cell_and_whole(word: int) -> None:
+    """Of even cells and of those of a heavy tail, each half of which has as many."""
+    for quantiles in (gamma_quantiles_ns(300_000, 300_000), gamma_quantiles_ns(300_000, 900_000)):
+        value, above = interpolate_ns(quantiles, word), 2**64 - 1 - word
+        place = CELLS - 1 - (above >> 52), word & (1 << 52) - 1, 52
+        if len(quantiles) > CELLS + 1 and above < 1 << 60:
+            bits = above.bit_length()
+            cell, rest = divmod((1 << bits) - above, 1 << max(0, bits - 7)) if bits > 7 else (0, 0)
+            place = TAIL_CELL + (60 - bits) * HALF_CELLS + cell, rest, bits - 7
+        at, rest, size = place
+        if at >= len(quantiles) - 1:
+            assert value == quantiles[-1]
+        else:
+            assert type(value) is int and value == quantiles[at] + ((quantiles[at + 1] - quantiles[at]) * rest >> size)
 
 
 def test_nothing_of_the_mathematical_library_decides() -> None:
@@ -205,12 +137,5 @@ def test_nothing_of_the_mathematical_library_decides() -> None:
 
 def test_tables_are_the_same_in_every_version() -> None:
     """A capture's delays follow from them."""
-    quantiles = gamma_quantiles_ns(300_000, 300_000)
-    assert [quantiles[cell] for cell in (1, 1024, 2048, 3072, 4095, 4096)] == [
-        73,
-        86305,
-        207944,
-        415888,
-        2495330,
-        4158883,
-    ]
+    found = [gamma_quantiles_ns(300_000, 300_000)[cell] for cell in (1, 1024, 2048, 3072, 4095, 4096)]
+    assert found == [73, 86305, 207944, 415888, 2495330, 4158883]

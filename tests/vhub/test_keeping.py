@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-import pytest
-
 from foosim.common import limits
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Publish
@@ -13,7 +11,7 @@ from foosim.protocol.messages import Commit, End, Tempo, Up
 from foosim.vhub.main import needs_record
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.paced_release import Release, Releases
-from foosim.vhub.state.capture_queue import CaptureQueue, RecordClosing
+from foosim.vhub.state.capture_queue import RecordClosing
 from foosim.vhub.state.records import Closing
 from tests.vhub.test_sessions import FRAME, MS, Hub, sent
 
@@ -23,32 +21,6 @@ LATER_NS: Final = 3 * T + 7
 
 def closing(tick: int) -> Closing:
     return Closing(type(FRAME)(tick, FRAME.layout, FRAME.values), b"", [], [])
-
-
-def ticks(kept: list[RecordClosing]) -> list[int]:
-    return [keep.closing.frame.tick for keep in kept]
-
-
-def test_closings_wait_for_the_oldest_of_which_something_waits() -> None:
-    keeping = CaptureQueue()
-    for tick in range(5, 9):
-        keeping.add(closing(tick))
-    assert ticks(keeping.take(5)) == []
-    assert ticks(keeping.take(7)) == [5, 6] and ticks(keeping.take(7)) == []
-    keeping.add(closing(9))
-    assert ticks(keeping.take(None)) == [7, 8, 9] and keeping.take(None) == []
-
-
-@pytest.mark.parametrize("order", [(4, 2, 3), (2, 3, 4)])
-def test_the_oldest_that_waits_is_known_whatever_leaves_first(order: tuple[int, int, int]) -> None:
-    releases = Releases(T)
-    for at_ns, tick in enumerate(order):
-        releases.add(f"client-{tick}", 1, tick, [Flight("camera", "ear", "ball", 1, 0, 0, b"")], at_ns)
-    assert releases.waiting_tick == 2
-    assert [release.tick for release in releases.take(1)] == list(order[:2])
-    assert releases.waiting_tick == order[2]
-    assert [release.tick for release in releases.take(0, everything=True)] == [order[2]]
-    assert not releases.waiting_tick
 
 
 class Later(Releases):

@@ -89,16 +89,16 @@ class Ledger(RuleBasedStateMachine):
         self.down = down
 
     @rule(count=st.integers(1, 5), cause=st.sampled_from(("malformed", "inbox_full")))
-    def refuse_at_door(self, count: int, cause: str) -> None:
-        self.state.refuse_at_door(cause, count)
+    def reject_on_receipt(self, count: int, cause: str) -> None:
+        self.state.reject_on_receipt(cause, count)
         self.refused[cause] += count
 
     @rule()
     def put_away_and_take_out(self) -> None:
-        door = self.state.at_door
+        door = self.state.rejected_on_receipt
         raw = self.state.snapshot()
         self.state = HubState.restore(DEPLOYMENT, raw)
-        self.state.at_door = door  # what no closing has counted is not of the state yet
+        self.state.rejected_on_receipt = door  # what no closing has counted is not of the state yet
         assert self.state.snapshot() == raw
 
     @rule(samples=SAMPLES, commands=COMMANDS)
@@ -181,7 +181,7 @@ class Ledger(RuleBasedStateMachine):
 
     @invariant()
     def refusals_stand_apart(self) -> None:
-        counted = Counter(self.state.refusals) + Counter(self.state.at_door)
+        counted = Counter(self.state.refusals) + Counter(self.state.rejected_on_receipt)
         assert counted == +self.refused
         assert self.state.packets.refused == sum(self.state.refusals.values())
 

@@ -201,17 +201,6 @@ def test_packets_that_are_longer_than_an_mtu_are_named(limit: int) -> None:
     assert warning in "\n".join(start_lines(summaries(made), "some.yaml"))
 
 
-@pytest.mark.parametrize(("rays", "is_long"), [(187, False), (360, True)])
-def test_a_scan_that_is_longer_than_the_mtu_of_wifi_is_named(rays: int, is_long: bool) -> None:
-    """The preset has 1500 B."""
-    scan = f"robots.red.goal.sensors.encoder={{kind: laser_scanner, rate: 10 Hz, rays: {rays}, range: 8 m}}"
-    places = ", ".join(f"{name}: [0 m, 0 m, 2 m]" for name in ("player-red", "player-blue", "camera"))
-    wifi = f"network={{radios: {{w: {{preset: wifi_5_indoor}}}}, robots: {{'*': [w]}}, places: {{{places}}}}}"
-    made = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [scan, wifi]), TABLE.name)
-    named = f"mtu of 1500 B are dropped: red.goal encoder ({8 * rays} B)"
-    assert [named in text for text in warnings_of(made)] == [True] * is_long
-
-
 def test_commands_of_a_fixed_or_a_jointed_size_that_are_longer_than_an_mtu_are_named() -> None:
     """Four rotors have 32 B, an arm of seven joints 56 B."""
     path = TABLE.with_name("yard.yaml")
@@ -267,9 +256,6 @@ def test_means_of_models_of_loss_and_delay() -> None:
     assert mean_loss(loss="10 %", burst=burst) == pytest.approx(1 - 0.9 * 0.95)
     assert mean_delay_ns(burst=burst) == pytest.approx(9e6 * 0.1 * 0.5 / 0.95)
     assert mean_delay_ns(burst={**burst, "loss": "50 %"}) == pytest.approx(9e6)
-    outages = {"mean_on": "3 s", "mean_off": "1 s"}
-    assert mean_loss(outages=outages, loss="10 %", burst=burst) == pytest.approx(1 - 0.75 * 0.9 * 0.95)
-    assert mean_loss(outages=outages, gilbert_elliott={"p": "1 %", "r": "19 %"}) == pytest.approx(1 - 0.75 * 0.95)
     four = {"p13": "5 %", "p31": "30 %", "p32": "20 %", "p23": "40 %", "p14": "2 %"}
     steps = np.array([[0.93, 0, 0.05, 0.02], [0, 0.6, 0.4, 0], [0.3, 0.2, 0.5, 0], [1.0, 0, 0, 0]])
     shares = np.full(4, 0.25)

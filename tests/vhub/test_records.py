@@ -15,7 +15,6 @@ from foosim.common.errors import Malformed
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Down
 from foosim.runtime.journal import Journal, journal_files, read_journal, read_records
-from foosim.runtime.journal_format import FRAMING_BYTES
 from foosim.vhub.recording.rows_of_closing import Entry, Plan, packet_entry, plan_of, world_rows
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.hub_state import HubState
@@ -89,30 +88,8 @@ def test_a_fold_from_any_head_goes_on_equally(hub_run: HubRun, first: int) -> No
     assert states == hub_run.snapshots[first + 1 :]
 
 
-def test_every_state_is_its_bytes(hub_run: HubRun) -> None:
-    for snapshot in hub_run.snapshots:
-        assert HubState.restore(hub_run.deployment, snapshot).snapshot() == snapshot
-
-
 def test_the_head_of_the_hub_is_the_state_after_its_last_record(hub_run: HubRun) -> None:
     assert hub_run.head == head_of(hub_run, 63)
-
-
-def test_a_journal_torn_within_its_last_records_folds_to_the_one_before(hub_run: HubRun, tmp_path: Path) -> None:
-    """Which records are read of a file torn at any byte is in tests/runtime/test_journal.py."""
-    kept = [head_of(hub_run, 60), *hub_run.records[-3:]]
-    with Journal(tmp_path, "vhub") as journal:
-        for record in kept:
-            journal.append(record)
-    content = journal.path.read_bytes()
-    last, before = len(kept[3]) + FRAMING_BYTES, len(kept[2]) + FRAMING_BYTES
-    for cut in (0, 1, last - 1, last, last + 1, last + before - 1, last + before):
-        journal.path.write_bytes(content[: len(content) - cut])
-        records = list(read_records(journal.path))
-        whole = 4 if cut == 0 else 3 if cut <= last else 2
-        assert records == kept[:whole], cut
-        states = [state.snapshot() for state, _ in fold(hub_run.deployment, records)]
-        assert states == hub_run.snapshots[61 : 60 + whole], cut
 
 
 def test_files_that_turn_and_go_fold_to_the_same_hub(hub_run: HubRun, tmp_path: Path) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,7 +11,7 @@ from foosim.common.json_text import decode_json
 from foosim.protocol import channels
 from foosim.protocol.messages import Tempo
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.paced_release import ANCHOR_WINDOW_NS, Release, Releases
+from foosim.vhub.paced_release import ANCHOR_WINDOW_NS, Releases
 from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 MS: Final = 1_000_000
@@ -32,29 +31,55 @@ def releases(factor: float = 1.0) -> Releases:
     return made
 
 
-def numbers(taken: list[Release]) -> list[tuple[str, int]]:
-    return [(release.client, release.number) for release in taken]
+STEPS = st.lists(
+    st.one_of(
+        st.tuples(st.just("commit"), st.integers(0, 3 * T)),
+        st.tuples(st.just("close"), st.sampled_from("ab"), st.lists(st.integers(0, 3 * T), max_size=3)),
+        st.tuples(st.just("pace"), st.sampled_from((0.0, 0.5, 1.0, 3.0)), st.booleans()),
+        st.tuples(st.just("wait"), st.sampled_from((0, 1, T, 9 * T, ANCHOR_WINDOW_NS))),
+    ),
+    max_size=40,
+)
 
 
-@pytest.mark.parametrize("factor", [1.0, 2.0, 0.5])
-def test_a_packet_leaves_at_anchor_plus_due(factor: float) -> None:
-    made = releases(factor)
-    made.committed(10, START + int(10 * T / factor))
-    now = START + int(10 * T / factor)
-    made.add("watcher", 1, 10, [flight(11 * T)], now)
-    at = START + int(11 * T / factor)
-    assert made.deadline_ns == at
-    assert made.take(at - 1) == [] and numbers(made.take(at)) == [("watcher", 1)]
-    assert made.take(at + 10**12) == []
-
-
-def test_what_leaves_together_leaves_with_its_latest() -> None:
-    made = releases()
-    made.committed(10, START + 10 * T)
-    made.add("watcher", 1, 10, [flight(10 * T + 5, 1), flight(10 * T + 900, 2), flight(10 * T + 7, 3)], START)
-    assert made.deadline_ns == START + 10 * T + 900
-    (release,) = made.take(START + 11 * T)
-    assert [flying.sequence for flying in release.flights] == [1, 2, 3] and release.tick == 10
+@settings(max_examples=200)
+@given(steps=STEPS, factor=st.sampled_from((0.0, 1.0, 3.0)))
+def test_packets_leave_at_the_anchor_plus_the_latest_due_time(steps: list[Any], factor: float) -> None:
+    """The anchor is the least lag of the last second of commits. Without one, and in fast, packets leave at once; never
+    before their tick is closed, nor before earlier ones of their client. What waits leaves when the pace changes."""
+    made, now, tick, paused = releases(factor), START, 0, False
+    anchors: list[tuple[int, int]] = []
+    waiting: list[tuple[int, str, int]] = []
+    count = {"a": 0, "b": 0}
+    for step, *what in steps:
+        if step == "commit":
+            tick, now = tick + 1, now + what[0]
+            made.committed(tick, now)
+            if factor:
+                anchors = [known for known in anchors if known[0] >= now - ANCHOR_WINDOW_NS]
+                anchors.append((now, now - int(tick * T / factor)))
+        elif step == "close":
+            client, due = what
+            count[client] += 1
+            made.add(client, count[client], tick, [flight(tick * T + after) for after in due], now)
+            at_ns = max([now, *(at_ns for at_ns, name, _ in waiting if name == client)])
+            if anchors and due:
+                at_ns = max(at_ns, min(anchor for _, anchor in anchors) + int((tick * T + max(due)) / factor))
+            waiting = sorted([*waiting, (at_ns, client, count[client])])
+        elif step == "pace":
+            if what != [factor, paused]:
+                anchors, waiting = [], [(0, name, number) for _, name, number in waiting]
+            factor, paused = what
+            made.set_tempo(factor, paused)
+        else:
+            now += what[0]
+            leaving = [one for one in waiting if one[0] <= now]
+            assert [(release.client, release.number) for release in made.take(now)] == [one[1:] for one in leaving]
+            waiting = [one for one in waiting if one[0] > now]
+        assert made.deadline_ns == min((at_ns for at_ns, _, _ in waiting), default=None)
+    assert [(release.client, release.number) for release in made.take(0, everything=True)] == [
+        one[1:] for one in waiting
+    ]
 
 
 def test_it_counts_how_late_packets_leave() -> None:
@@ -76,121 +101,6 @@ def test_it_counts_how_late_packets_leave() -> None:
     made.add("watcher", 5, 41, [flight(90 * T, 7)], START + 40 * T)
     made.take(START + 41 * T, everything=True)
     assert made.lateness.count == 4, "what no clock gave a time, and what the end of the run let go, is not late"
-
-
-def test_never_before_its_tick_is_closed() -> None:
-    made = releases()
-    made.committed(10, START + 10 * T)
-    late = START + 30 * T
-    made.add("watcher", 1, 10, [flight(11 * T)], late)
-    assert made.deadline_ns == late and numbers(made.take(late)) == [("watcher", 1)]
-
-
-def test_in_fast_it_leaves_at_once_in_the_order_of_ticks() -> None:
-    made = releases(0.0)
-    made.committed(10, START)
-    for tick in range(3):
-        for client in ("z", "a"):
-            made.add(client, tick + 1, tick, [flight(100 * T)], START)
-    assert numbers(made.take(START)) == [("a", 1), ("a", 2), ("a", 3), ("z", 1), ("z", 2), ("z", 3)]
-
-
-def test_before_the_first_commit_it_leaves_at_once() -> None:
-    made = releases()
-    made.add("watcher", 1, 0, [flight(50 * T)], START)
-    assert made.deadline_ns == START
-
-
-def test_the_anchor_is_the_least_of_the_last_second() -> None:
-    made = releases()
-    for tick, lag in ((0, 5 * MS), (1, 1 * MS), (2, 9 * MS)):
-        made.committed(tick, START + tick * T + lag)
-    made.add("watcher", 1, 2, [flight(100 * T)], START)
-    assert made.deadline_ns == START + 100 * T + 1 * MS, "late commits do not spoil it"
-    made.take(10**18)
-    later = START + 2 * T + 9 * MS + ANCHOR_WINDOW_NS + 1
-    made.committed(500, later)
-    made.add("watcher", 2, 500, [flight(600 * T)], later)
-    assert made.deadline_ns == later + 100 * T, "what is older than a second is forgotten"
-
-
-def test_another_pace_or_a_pause_learns_the_anchor_anew() -> None:
-    made = releases()
-    made.committed(10, START)
-    made.set_tempo(1.0, True)
-    made.set_tempo(1.0, False)
-    now = START + 60_000 * MS
-    made.add("watcher", 1, 10, [flight(12 * T)], now)
-    assert made.deadline_ns == now, "no anchor yet"
-    made.take(now)
-    made.committed(11, now)
-    made.add("watcher", 2, 11, [flight(13 * T)], now)
-    assert made.deadline_ns == now + 2 * T
-    made.set_tempo(2.0, False)
-    made.committed(12, now + T)
-    made.add("watcher", 3, 12, [flight(16 * T)], now + T)
-    assert numbers(made.take(now + 3 * T)) == [("watcher", 2), ("watcher", 3)]
-
-
-@pytest.mark.parametrize("tempo", [(0.0, False), (2.0, False), (0.001, True)])
-def test_what_waits_by_an_old_pace_leaves_when_it_changes(tempo: tuple[float, bool]) -> None:
-    made = releases(0.001)
-    made.committed(10, START)
-    for number in (1, 2, 3):
-        made.add("watcher", number, 10 + number, [flight((10 + number) * T)], START)
-    assert made.deadline_ns is not None and made.deadline_ns > START + 1000 * MS
-    made.set_tempo(*tempo)
-    assert numbers(made.take(START + 1)) == [("watcher", 1), ("watcher", 2), ("watcher", 3)]
-
-
-def test_a_client_gets_nothing_before_what_it_was_released_earlier() -> None:
-    """A commit that came early moves the anchor: what follows would overtake what waits."""
-    made = releases()
-    made.committed(10, START + 10 * T + 5 * MS)
-    made.add("watcher", 1, 10, [flight(11 * T)], START + 10 * T)
-    made.add("other", 1, 10, [flight(11 * T)], START + 10 * T)
-    made.committed(11, START + 11 * T)
-    made.add("watcher", 2, 11, [flight(11 * T + 1)], START + 10 * T)
-    assert numbers(made.take(START + 11 * T + 5 * MS)) == [("other", 1), ("watcher", 1), ("watcher", 2)]
-
-
-def test_the_same_tempo_again_changes_nothing() -> None:
-    made = releases()
-    made.committed(10, START)
-    made.set_tempo(1.0, False)
-    made.add("watcher", 1, 10, [flight(12 * T)], START)
-    assert made.deadline_ns == START + 2 * T
-
-
-@settings(max_examples=100)
-@given(
-    steps=st.lists(
-        st.tuples(st.sampled_from(["a", "b"]), st.integers(0, 5), st.integers(0, 3 * T), st.integers(0, 2 * T)),
-        max_size=30,
-    ),
-    factor=st.sampled_from([0.0, 1.0, 3.0]),
-)
-def test_nothing_is_lost_and_a_clients_downlinks_leave_in_order(
-    steps: list[tuple[str, int, int, int]], factor: float
-) -> None:
-    """Due times grow from tick to tick, as closings make them; the hub looks as often as it likes."""
-    made = releases(factor)
-    now, due = START, 0
-    said: dict[str, list[int]] = {"a": [], "b": []}
-    count = {"a": 0, "b": 0}
-    for tick, (client, lag, more, wait) in enumerate(steps):
-        made.committed(tick, now + lag)
-        due += more
-        count[client] += 1
-        made.add(client, count[client], tick, [flight(due)], now)
-        now += wait
-        taken = made.take(now)
-        assert all(release.at_ns <= now for release in taken)
-        for release in taken:
-            said[release.client].append(release.number)
-    for release in made.take(10**18):
-        said[release.client].append(release.number)
-    assert said == {client: list(range(1, last + 1)) for client, last in count.items()}
 
 
 def test_a_report_tells_how_late_packets_left() -> None:

@@ -11,7 +11,7 @@ from foosim.protocol.actions import Journal, Publish
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Farewell, Tempo, Up
 from foosim.vhub.core import HubCore
-from foosim.vhub.status import LINKS_TOLD_EVERY
+from foosim.vhub.status import LINKS_REPORTED_EVERY
 from tests.vhub.test_sessions import PERIODS, Hub, sent
 
 
@@ -62,14 +62,14 @@ def test_heartbeats_share_the_lines_about_links_and_the_farewell_has_its_own() -
     hub = Hub().begin()
     hub.enter("ear")
     counts = []
-    for beat in range(2 * LINKS_TOLD_EVERY + 2):
+    for beat in range(2 * LINKS_REPORTED_EVERY + 2):
         hub.say(channels.UP, "ear", Up("ear", "one", [sent(beat + 1)]))
         hub.close(beat)
         hub.said()
         hub.core.wake(beat * HEARTBEAT_NS)
         (report,) = (decode_json(each.report) for each in hub.said(channels.HEARTBEAT))
         counts.append((report["packets"]["offered"], sum(link[2] for link in report["links"])))
-    anew = [beat // LINKS_TOLD_EVERY * LINKS_TOLD_EVERY for beat in range(len(counts))]
+    anew = [beat // LINKS_REPORTED_EVERY * LINKS_REPORTED_EVERY for beat in range(len(counts))]
     assert counts == [(beat + 1, told + 1) for beat, told in enumerate(anew)]
     last = decode_json(decode_any(Farewell, hub.core.farewell().payload).report)
     assert sum(link[2] for link in last["links"]) == len(counts)

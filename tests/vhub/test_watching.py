@@ -30,9 +30,9 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub import status
 from foosim.vhub.network.packet import DROPPED, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
-from foosim.vhub.stages.told import Evidence
+from foosim.vhub.stages.explanation import Evidence
 from foosim.vhub.state.records import Closing
-from foosim.vhub.watching import DROPS_KEPT, READINGS_KEPT, REPORT_BYTES_MAX, Watching
+from foosim.vhub.watching import DROPS_KEPT, READINGS_KEPT, REPORT_BYTES_MAX, WatchList
 from foosim.world.edits import Disrupt
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
@@ -143,13 +143,13 @@ def test_the_last_drops_of_a_watched_link_are_told_as_rows() -> None:
 
 
 def test_watched_links_are_told_beside_the_busiest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(status, "LINKS_TOLD_MAX", 3)
+    monkeypatch.setattr(status, "LINKS_REPORTED_MAX", 3)
     state = seen().system.hub.state
     assert state is not None and len(state.fabric.states) > 4
     order = sorted(state.fabric.states, key=lambda key: (-state.fabric.states[key].offered, key))
     last = order[-1]
     for watched, expected in (([], order[:3]), ([last[:2], ("no", "body")], [*order[:3], last])):
-        lines = decode_json(bytes(status.LinksTold().lines(state, watched, anew=True)))
+        lines = decode_json(bytes(status.LinkLines().lines(state, watched, anew=True)))
         assert [(line[0], line[1], line[6]) for line in lines] == sorted(expected)
 
 
@@ -276,7 +276,7 @@ def test_so_much_is_looked_at_together_and_no_more() -> None:
 def test_a_report_of_what_is_looked_at_has_a_size() -> None:
     state = unseen().system.hub.state
     assert state is not None
-    watching = Watching()
+    watching = WatchList()
     ranges = [("rover", f"ranges-{n}") for n in range(limits.WATCHED_MAX)]
     watching.take(Watched([LINK], ranges), b"", 0)
     for tick in range(2 * READINGS_KEPT):

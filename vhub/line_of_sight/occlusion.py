@@ -1,23 +1,19 @@
 """Line of sight: which things of the world a straight line between two antennas crosses, and how far inside of each.
 
-The things are those of the scene: the scenery, prepared once, and the bodies, placed by the one forward kinematics
-when somebody asks for a line in that frame. What is crossed is worked out from the lesser of the two ends, so both
-directions of a pair have the same crossings to the last bit. Boxes around things say in one pass for many lines where
-to look; what is said then comes from one spelling of plain floats, so it does not matter in which company or order a
-line is asked for.
+The things are those of the scene: the scenery, prepared once, and the bodies, placed by the forward kinematics for the
+first line near them in a frame. Crossings are computed from the lesser of the two ends, so both directions of a pair
+have the same ones to the last bit. Boxes and pillars around things only select candidates; the crossings of each
+candidate come from one routine on plain floats, so neither order nor other lines change them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from math import inf, sqrt
-from typing import Final, Generic, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
-from foosim.deployment.schema import Deployment
-from foosim.world.assembly.world import build_scene
-from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.layout import Declared, Layout
+from foosim.world.layout import Layout
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.rays.boxes import MARGIN_M, boxes_around, boxes_met_by
 from foosim.world.rays.solids import Line, Meshes, Piece, Solid, chord_of, joined, ray_of, solid_of
@@ -36,20 +32,13 @@ from foosim.world.scene import (
 )
 
 REACH_M: Final = 0.5
-"""Of a line it is remembered what of the scenery may be there as long as no end has moved further along an axis."""
-CELL_M: Final = 1.0
-"""What is remembered of a line is found by the cells of this size that its ends are in."""
-PAIRS_KEPT: Final = 4096
-"""Pairs of cells of which it is remembered, at least."""
+"""The scenery near a line is valid while neither end has moved further than this along an axis."""
 UNKNOWN: Vector = (inf, inf, inf)
 """In place of a place: nothing is there."""
 
-Key = tuple[Line, frozenset[str]]
-"""A line from its lesser end, and the bodies that are ignored."""
-
 
 class Crossing(NamedTuple):
-    """A thing that a line crosses: its name (of the scenery, or the entity's), what it is made of, the way through it.
+    """A thing that a line crosses: its name (of the scenery, or the entity's), its material, the way through it.
 
     `chord_m` is how far the line is inside of it, 0 for a wall without a thickness of its own. `entry_m` and `exit_m`
     are the distances from the lesser end at which it begins and ends.
@@ -114,33 +103,6 @@ def _by_distance(crossing: Crossing) -> tuple[float, str]:
     return crossing.entry_m, crossing.name
 
 
-K = TypeVar("K")
-V = TypeVar("V")
-
-
-class _Memory(Generic[K, V]):
-    """What was worked out lately: what nobody has asked for since PAIRS_KEPT others came is forgotten."""
-
-    def __init__(self) -> None:
-        self._newer: dict[K, V] = {}
-        self._older: dict[K, V] = {}
-
-    def known(self, key: K) -> V | None:
-        """Return what is remembered, None if it is not."""
-        found = self._newer.get(key)
-        if found is None:
-            found = self._older.get(key)
-            if found is not None:
-                self.keep(key, found)
-        return found
-
-    def keep(self, key: K, value: V) -> None:
-        """Remember."""
-        if len(self._newer) >= PAIRS_KEPT:
-            self._older, self._newer = self._newer, {}
-        self._newer[key] = value
-
-
 class Trace:
     """What is remembered of a line whose ends move: what of the scenery is near, and what of it the line crosses."""
 
@@ -169,26 +131,14 @@ class Trace:
 
 
 class Still:
-    """The scenery, and what is remembered of lines through it that nobody else remembers."""
+    """The scenery."""
 
     def __init__(self, shapes: Sequence[Shape]) -> None:
-        self.shapes = shapes
         self.groups = _Groups()
         opaque = [shape for shape in shapes if not shape.radio.is_transparent]
         self.solids = self.groups.solids(opaque)
         boxes = [shape_box(shape) for shape in opaque]
         self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], REACH_M + MARGIN_M)
-        self._traces = _Memory[Line, Trace]()
-
-    def trace(self, line: Line) -> Trace:
-        """Return what is remembered of lines from cell to cell."""
-        (ax, ay, az), (bx, by, bz) = line
-        cells = (ax // CELL_M, ay // CELL_M, az // CELL_M), (bx // CELL_M, by // CELL_M, bz // CELL_M)
-        found = self._traces.known(cells)
-        if found is None:
-            found = Trace()
-            self._traces.keep(cells, found)
-        return found
 
     def crossed(self, line: Line, trace: Trace) -> tuple[Crossing, ...]:
         """Return what a line crosses of the scenery; `trace` is what is remembered of it, or of one like it."""
@@ -230,19 +180,14 @@ def _reach(body: Body) -> float | Pillar:
 class Geometry:
     """A scene as rays meet it: scenery that stands, and the links of bodies, to be placed for each frame."""
 
-    def __init__(self, scene: Scene, still: Still | None = None) -> None:
-        """`still` is the same scenery, prepared before."""
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.still = Still(scene.scenery) if still is None else still
+        self.still = Still(scene.scenery)
         self.groups = _Groups()
         self.limbs = {
             body.name: [_Limb(body.name, link, self.groups) for link in body.links] for body in scene.bodies.values()
         }
         self.reaches = {name: _reach(body) for name, body in sorted(scene.bodies.items())}
-
-    def sight(self, layout: Layout, numbers: Sequence[float]) -> Sight:
-        """Return what there is to see at a frame: `numbers` are its values, `layout` has the scene's bodies."""
-        return Sight(self, layout, numbers)
 
 
 class _Placed:
@@ -276,36 +221,22 @@ class _Placed:
 
 
 class Sight:
-    """Lines of sight in one frame, each worked out once."""
+    """Lines of sight in one frame: `numbers` are its values, `layout` has the scene's bodies."""
 
     def __init__(self, geometry: Geometry, layout: Layout, numbers: Sequence[float]) -> None:
         self._geometry, self._layout, self._numbers = geometry, layout, numbers
-        self._found: dict[Key, tuple[Crossing, ...]] = {}
         self._placed: dict[str, list[_Placed]] = {}
         self._around: list[Pillar] | None = None
         """What is around bodies."""
 
-    def between(self, a: Vector, b: Vector, ignoring: Collection[str] = ()) -> tuple[Crossing, ...]:
-        """Return what the line between two points (m, world frame) crosses, the bodies `ignoring` (entities) aside.
+    def crossings(self, line: Line, ignoring: frozenset[str], trace: Trace) -> tuple[Crossing, ...]:
+        """Return what a line from its lesser end crosses, without the bodies `ignoring` (entities).
 
         In the order of their distance from the lesser end, then of their names: the same for both directions. Shapes
         of one body, or of scenery with one name, that overlap and are of the same material count as one. A closed mesh
-        counts as one however often the line enters it: its chords add up. Of a mesh that is not closed each wall that
-        the line passes counts. An end that is inside of something is where its chord begins or ends. What is
-        transparent is left out.
-        """
-        line = (a, b) if a <= b else (b, a)
-        key = line, frozenset(ignoring)
-        found = self._found.get(key)
-        if found is None:
-            trace = self._geometry.still.trace(line)
-            found = self._found[key] = self.look(line, key[1], trace)
-        return found
-
-    def look(self, line: Line, ignoring: frozenset[str], trace: Trace) -> tuple[Crossing, ...]:
-        """Work out what a line from its lesser end crosses, for who remembers it: `between` says what that is.
-
-        `trace` is what who asks remembers of the same line in frames before.
+        counts as one however often the line enters it: its chords add up. Of an open mesh each wall that the line
+        passes counts. At an end inside a thing its chord begins or ends. Transparent things are left out. `trace` is
+        what the caller remembers of the same line in earlier frames.
         """
         standing = self._geometry.still.crossed(line, trace)
         if self._around is None:
@@ -377,29 +308,3 @@ def pillars_met_by(pillars: list[Pillar], line: tuple[Vector, Vector]) -> list[s
         if aside * aside <= reach * square and top >= low_z and bottom <= high_z:
             met.append(name)
     return met
-
-
-class LineOfSight:
-    """Lines of sight in the frames of a run. It remembers the scene of the newest layout, and the newest frame's."""
-
-    def __init__(self, deployment: Deployment) -> None:
-        self._deployment = deployment
-        self._geometry = Geometry(Scene({}, ()))
-        self._layout = Layout({}, Declared())
-        self._frame: Frame | None = None
-        self._sight = self._geometry.sight(self._layout, ())
-
-    def at(self, frame: Frame) -> Sight:
-        """Return the sight in a frame; nothing is worked out before somebody asks it for a line."""
-        if frame is not self._frame:
-            if frame.layout.digest != self._layout.digest:
-                self._turn_to(frame.layout)
-            self._frame = frame
-            self._sight = self._geometry.sight(frame.layout, frame.numbers)
-        return self._sight
-
-    def _turn_to(self, layout: Layout) -> None:
-        scene = build_scene(self._deployment, layout)
-        still = self._geometry.still
-        self._geometry = Geometry(scene, still if tuple(still.shapes) == tuple(scene.scenery) else None)
-        self._layout = layout

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Final
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
-from foosim.vhub.line_of_sight.occlusion import Crossing, LineOfSight, Sight, Trace
+from foosim.vhub.line_of_sight.occlusion import Crossing, Geometry, Sight, Trace
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics, velocity
@@ -22,7 +21,7 @@ VEHICLE: Final = "vehicle"
 
 
 class _Robot:
-    """A robot, or an endpoint that is on none, in the frames of one layout."""
+    """A robot, or an endpoint without a body, in the frames of one layout."""
 
     __slots__ = ("antenna", "body", "entity", "orientation", "position", "turns")
 
@@ -38,21 +37,20 @@ class _Robot:
 
 
 class World:
-    """Antennas and lines of sight. Nothing is computed before somebody asks."""
+    """Antennas and lines of sight, each computed when it is first needed."""
 
     def __init__(self, deployment: Deployment, network: Network) -> None:
         self._deployment, self._places = deployment, network.places
         self._carriers = deployment.carriers()
-        self._sights: LineOfSight | None = None
-        self._sight: Sight | None = None
         self._frame: Frame | None = None
+        self._geometry: Geometry | None = None
+        """The scene of the frame's layout."""
+        self._sight: Sight | None = None
         self._numbers: list[float] | None = None
-        self._bodies: Mapping[str, Body] | None = None
         self._robots: dict[str, _Robot] = {}
         """By endpoint, in the frames of a layout."""
         self._standing: dict[str, Vector] = {}
         self._down: frozenset[str] = frozenset()
-        self._switched: Layout | None = None
         self._named: list[str] = []
         self._switches = np.zeros(0, np.intp)
         """Of each robot of that layout: the slot that says whether it is out of service."""
@@ -62,23 +60,17 @@ class World:
         """Grows with every frame."""
 
     def turn_to(self, frame: Frame) -> bool:
-        """Take the newest committed frame; return whether others are out of service in it."""
+        """Take the newest committed frame; return whether other endpoints are out of service in it."""
         if frame is self._frame:
             return False
         if self._frame is None or frame.layout is not self._frame.layout:
-            self._bodies = None
+            self._geometry = None
             self._robots.clear()
-        self._frame, self._sight, self._numbers = frame, None, None
-        self.turns += 1
-        return self._look_who_is_down(frame)
-
-    def _look_who_is_down(self, frame: Frame) -> bool:
-        """Take who is out of service; return whether that are others than before."""
-        if frame.layout is not self._switched:
-            self._switched = frame.layout
             self._named = [robot.name for robot in frame.layout.robots]
             self._switches = np.array([robot.offsets["down"] for robot in frame.layout.robots], np.intp)
             self._states = b""
+        self._frame, self._sight, self._numbers = frame, None, None
+        self.turns += 1
         found = frame.values[self._switches]
         states = found.tobytes()
         if states == self._states:
@@ -129,18 +121,22 @@ class World:
         return None if body is None else shape_box(body.links[0].shapes[0])[1][2]
 
     def _robot(self, endpoint: str) -> _Robot:
-        """Return the robot that an endpoint is or is on board of, as the newest frame's layout has it."""
+        """Return the robot that an endpoint is or is on board of, in the newest frame's layout."""
         found = self._robots.get(endpoint)
         if found is None:
-            layout = None if self._frame is None else self._frame.layout
-            if self._bodies is None:
-                self._bodies = {} if layout is None else build_scene(self._deployment, layout).bodies
-            name = self.body(endpoint)
-            found = self._robots[endpoint] = _Robot(name, self._bodies.get(name), layout)
+            layout, name = None if self._frame is None else self._frame.layout, self.body(endpoint)
+            body = None if layout is None else self._scene(layout).scene.bodies.get(name)
+            found = self._robots[endpoint] = _Robot(name, body, layout)
         return found
 
+    def _scene(self, layout: Layout) -> Geometry:
+        """Return the scene of the newest frame's layout."""
+        if self._geometry is None:
+            self._geometry = Geometry(build_scene(self._deployment, layout))
+        return self._geometry
+
     def _values(self) -> list[float]:
-        """Return the numbers of the newest frame; there is one."""
+        """Return the numbers of the newest frame, which must exist."""
         if self._numbers is None:
             assert self._frame is not None
             self._numbers = self._frame.numbers
@@ -158,14 +154,13 @@ class World:
     def crossings(
         self, a: Vector, b: Vector, ignoring: frozenset[str], trace: Trace | None = None
     ) -> tuple[Crossing, ...]:
-        """Return what the line between two places crosses, some bodies aside.
+        """Return what the line between two places crosses, without the bodies `ignoring`.
 
-        `trace` is what who asks in many frames remembers of the line.
+        `trace` is what the caller remembers of the line in earlier frames.
         """
         if self._frame is None:
             return ()
         if self._sight is None:
-            if self._sights is None:
-                self._sights = LineOfSight(self._deployment)
-            self._sight = self._sights.at(self._frame)
-        return self._sight.look((a, b) if a <= b else (b, a), ignoring, Trace() if trace is None else trace)
+            layout = self._frame.layout
+            self._sight = Sight(self._scene(layout), layout, self._values())
+        return self._sight.crossings((a, b) if a <= b else (b, a), ignoring, Trace() if trace is None else trace)

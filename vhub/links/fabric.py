@@ -30,7 +30,7 @@ from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.timeline import FOREVER_NS, Timeline
 from foosim.vhub.radio.propagation import Propagation
 from foosim.vhub.stages import STAGES
-from foosim.vhub.stages.custom_model import Own
+from foosim.vhub.stages.custom_model import CustomModel
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.queue import Queue
 from foosim.vhub.stages.stage import at_arrival, at_sending
@@ -54,7 +54,7 @@ class Settled:
         )
         self.at_sending, self.at_arrival = at_sending(self.stages), at_arrival(self.stages)
         self.slots = 0 if setup is None else slots_of(setup.settings, is_radio=setup.is_radio)
-        shares = setup is None or setup.is_radio or any(isinstance(stage, Queue | Own) for stage in self.stages)
+        shares = setup is None or setup.is_radio or any(isinstance(stage, Queue | CustomModel) for stage in self.stages)
         self.is_apart = not shares
 
 

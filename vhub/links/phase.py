@@ -55,7 +55,7 @@ def _phases(deployment: Deployment, late_ns: Callable[[Radio], int]) -> Iterator
             if robot is None or channel not in robot.sensors:
                 continue
             step, shift, turn = deployment.schedule(robot.sensors[channel])
-            if turn % step:  # its readings are not as many ticks apart each time: it is in step with nobody
+            if turn % step:  # its readings are not as many ticks apart each time: it is in step with no player
                 continue
             every = turn // step
             sampled = -(shift // step) % every

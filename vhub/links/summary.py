@@ -1,6 +1,6 @@
 """The summary of a network: mean loss, bursts, delay, airtime, throughput, range.
 
-Nothing here decides a fate: the same formulas as in the stages, asked for their means. Ranges are without shadowing and
+Nothing here decides a fate: the means of the formulas that the stages use. Ranges are without shadowing and
 fading, of ends 1.5 m above the ground where no place is written, and antennas mounted as they are.
 """
 

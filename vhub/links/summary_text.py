@@ -1,6 +1,6 @@
 """The summary of a network as lines of text: for `foosim net lint` without a terminal, and the start of a run.
 
-Pure: neighbours are `lint` (the figures), `supervisor.net_text` (tables), `main`, which logs them.
+Pure. Neighbours: `summary` (the figures), `main`, which logs them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How old the newest packet of each channel is when its receiver acts: the *age at use*, counted by the vHub.
 
 A link's delay says how late a packet comes; what a controller sees is older by the time until its next turn, and by how
-long ago the newest packet was sent. Counted at each tick at which a client in lockstep is asked, and of a free-running
+long ago the newest packet was sent. Counted at each tick at which a lockstep client is due, and of a free-running
 one at each tick that admits packets of it; channels that it hears and of which something has come. Ages are whole
 ticks, since all is sent at the start of its tick. Part of the vHub's state.
 """
@@ -82,14 +82,14 @@ class Ages:
         """Return the counts since the last row, when another one is due after the closing of a tick."""
         if (tick + 1) % self._every:
             return []
-        taken = self.untold(tick)
+        taken = self.unreported(tick)
         for pairs in self._heard.values():
             for heard in pairs.values():
                 add_counts(heard.whole, heard.recent)
                 heard.recent = {}
         return taken
 
-    def untold(self, tick: int) -> list[Age]:
+    def unreported(self, tick: int) -> list[Age]:
         """Return the counts since the last row up to the closing of a tick, by client, source and channel."""
         return [
             Age(tick, client, heard.source, heard.channel, dict(heard.recent))

@@ -88,7 +88,7 @@ class LinkModel(Protocol):
     """A model as made by its entry point from the deployment's parameters. Raises ValueError for invalid ones."""
 
     def judge(self, passage: Passage, memory: Any) -> Judged:
-        """Judge one packet, offered on a link behind the one that left this memory; None before the first."""
+        """Judge one packet, offered on a link after the one that left this memory; None before the first."""
 
 
 class ModelError(Refused):
@@ -130,7 +130,7 @@ def make_model(model: OwnModel) -> LinkModel:
         raise ModelError("name", f"not a link model that is installed here, there are {names}", model, nearest)
     if len(entries) > 1:
         givers = " and ".join(map(giver_of, entries))
-        raise ModelError("name", f"a link model of {givers}: which one is not said", model, None)
+        raise ModelError("name", f"ambiguous: a link model of {givers}", model, None)
     (entry,) = entries
     try:
         make: Any = entry.load()

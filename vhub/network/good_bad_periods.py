@@ -1,4 +1,4 @@
-"""Good and bad times of a link, as functions of simulated time: whoever asks, and however often, sees the same ones.
+"""Good and bad times of a link, as functions of simulated time: every caller sees the same ones, in any order.
 
 Lengths are drawn by (key, number of the episode). Times begin in their stationary state at time 0 (exact where lengths
 are exponential).
@@ -79,7 +79,7 @@ class Episodes:
 
 
 class Times:
-    """The good and bad times of one link, for each settings that it has: it goes on in them where it comes back."""
+    """The good and bad times of one link, for each of its settings: they continue when the settings return."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[bytes, int, int, Pareto | None], Episodes] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from foosim.common.keyed_random import draw_key
 from foosim.deployment.network.radios import Fading
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.radio.fading import block_of, fading_db, nakagami_m
+from foosim.vhub.radio.fading import fading_db, nakagami_m
 from foosim.vhub.radio.noise import centi, ratio_cdb
 from foosim.vhub.radio.propagation import NOWHERE, OUT_OF_RANGE, Path, Propagation
 
@@ -61,7 +61,7 @@ class Budget:
         parameter = fading.k_db
         if fading.kind == "nakagami":
             parameter = nakagami_m(distance_mm / 1000.0) if fading.m is None else fading.m
-        block = block_of(time_ns, fading.coherence_ns)
+        block = time_ns // fading.coherence_ns
         if block != self._block or parameter != self._parameter:
             self._block, self._parameter = block, parameter
             self._fading_cdb = centi(fading_db(self._key, block, fading.kind, parameter))

@@ -136,7 +136,7 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     cause: str = ""
     rule: str = ""
     words: tuple[int, ...] = ()
-    """The draws of the packet, when a stage asked for them: eight 64-bit words."""
+    """The draws of the packet, if its link uses any: eight 64-bit words."""
     slots: int = 0
     """The words that its link uses: bit n for slot n."""
     released_wall_ns: int = 0

@@ -1,6 +1,6 @@
 """The time line of a network: partitions, clogs and changed settings, as functions of simulated time.
 
-It is made from the deployment's events and from what was asked for while the run went on, in the order of time; every
+It is made from the deployment's events and from requests during the run, in the order of time; every
 random length is drawn from (seed, number of the event), so that the same time line comes out wherever it is made.
 What lasts ends at the next `heal` at the latest.
 """
@@ -78,7 +78,7 @@ class Timeline:
         self._compile()
 
     def add(self, event: Event) -> None:
-        """Take an event that was asked for; it is not earlier than anything that was judged."""
+        """Add a requested event; it is not earlier than any judged packet."""
         self._events.append((event, f"request {self._asked}"))
         self._asked += 1
         self._compile()
@@ -138,11 +138,6 @@ class Timeline:
         """Return what cuts a link at a time, the first to begin; None where nothing does."""
         found = [cut for cut in self.cuts if cut.start_ns <= at_ns < cut.end_ns and cut.parts(source, destination)]
         return min(found, key=lambda cut: (cut.start_ns, cut.end_ns), default=None)
-
-    @property
-    def has_holds(self) -> bool:
-        """Whether there ever is a clog."""
-        return bool(self.holds)
 
     def holds_of(self, source: str, destination: str) -> list[tuple[int, int]]:
         """Return the times in which the link is clogged, by start."""

@@ -95,29 +95,29 @@ class Contest:
         return at_ns + backoff_ns
 
     def put_off(self, turn_ns: int, busy_ns: int, slot_ns: int, of_all: dict[tuple[str, int, int], Turn]) -> None:
-        """Put off what comes behind a turn of the station that takes so long; `of_all` are all that have not begun.
+        """Defer the turns after one of the station that takes `busy_ns`; `of_all` are all turns that have not begun.
 
         They are frozen meanwhile, less the slot of their own countdown that it takes, and less the time for which a
         station was not ready yet. Who does not hear this station is put off as far as it hears one that is: of two that
         have not begun the later one knows whether they hear each other.
         """
-        behind = [turn for turn in self._turns if turn.known.turn_ns > turn_ns]
-        if not behind:
+        later = [turn for turn in self._turns if turn.known.turn_ns > turn_ns]
+        if not later:
             return
-        first = behind[0].known
+        first = later[0].known
         most_ns = busy_ns - min(slot_ns, first.turn_ns - max(first.ready_ns, turn_ns))
-        heard = {turn.known.source for turn in behind}
+        heard = {turn.known.source for turn in later}
         if len(of_all) > len(self._turns):  # of those that it hears all are in `_turns`
             hears = set(self.hears)
             others = [
                 turn for turn in of_all.values() if turn.known.turn_ns > turn_ns and turn.known.source not in hears
             ]
             if others:
-                behind = sorted([*behind, *others], key=_ORDER)
+                later = sorted([*later, *others], key=_ORDER)
         over_ns = turn_ns
         moved: dict[str, tuple[int, int, Transmission]] = {}
         last_ns: dict[int, int] = {}
-        for turn in behind:
+        for turn in later:
             known = turn.known
             source, until_ns = known.source, known.until_ns
             before = moved.get(source)

@@ -112,7 +112,7 @@ def contention(contenders: int, window: int, doublings: int) -> Contention:
     idle = _power(1.0 - tau, n)
     one = n * tau * _power(1.0 - tau, n - 1)
     share = (1.0 - idle - one) / (n * tau * p) if n > 1 else 0.0
-    if n == 1 or doublings < 2:  # nobody waits for so long that others are without it
+    if n == 1 or doublings < 2:  # no station waits so long that others contend without it
         return Contention(tau, p, chance_threshold(p), share, p, 0.0)
     other_tau = _send_probability(_collision_probability(n - 1, window, doublings), window, doublings)
     busy_without = 1.0 - _power(1.0 - other_tau, n - 1)
@@ -194,7 +194,7 @@ def wifi_access(
 
 
 def _countdown_ns(first: int, slots: int, collisions: int, exchange_ns: int, slot_ns: int, point: Contention) -> int:
-    """Return what a station counts down that drew so many slots, `first` of them from the least window.
+    """Return the countdown of a station that drew `slots`, `first` of them from the least window.
 
     In doubled windows it waits longer for a slot to pass, by the mean slots of n - 1 and of n stations; and each
     collision has spared it turns of the station that it collided with.

@@ -125,8 +125,3 @@ def fading_db(key: bytes, counter: int, kind: Kind, parameter: float = 0.0) -> f
 def nakagami_m(distance_m: float) -> float:
     """Return Nakagami's m by distance: 1.5 below 80 m, 0.75 beyond. Source: ns-3's defaults (0.75 again past 200 m)."""
     return 1.5 if distance_m < 80.0 else 0.75
-
-
-def block_of(time_ns: int, coherence_ns: int) -> int:
-    """Return the number of the block that a time falls into: the counter of its draw."""
-    return time_ns // coherence_ns

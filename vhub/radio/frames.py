@@ -1,6 +1,6 @@
 """Payloads as Wi-Fi frames: the modulation that rate control takes, and how long frame and acknowledgement last.
 
-What is asked for each packet is looked up by the payload's size, in bytes.
+All of it is looked up by the payload's size, in bytes.
 """
 
 from __future__ import annotations

@@ -57,50 +57,34 @@ MATERIALS: Final[Mapping[str, Material]] = MappingProxyType(
 """Source: ITU-R P.2040, table 3, lowest range of frequencies of each material."""
 
 
-class Slab:
-    """Slabs of one material in MATERIALS at one frequency: what depends on these alone is worked out once.
+@lru_cache(maxsize=1_024)
+def _slab(material: str, frequency_hz: float) -> tuple[complex, complex, float, float]:
+    """Return what slabs of a material share at a frequency: sqrt(eta), r^2, the gain at both surfaces and the cap."""
+    known = MATERIALS[material]
+    f_ghz = frequency_hz * 1e-9
+    eta = complex(known.a * f_ghz**known.b, -17.98 * known.c * f_ghz**known.d / f_ghz)
+    root = sqrt(eta)
+    r2 = ((1.0 - root) / (1.0 + root)) * ((1.0 - root) / (1.0 + root))
+    return root, r2, 20.0 * log10(abs(1.0 - r2)), inf if known.max_db is None else known.max_db
+
+
+def slab_loss_db(material: str, thickness_m: float, frequency_hz: float) -> float:
+    """Return the loss in dB of a wave that crosses a slab of a material in MATERIALS at a right angle.
 
     With eta the complex permittivity, q = 2 pi (t / lambda) sqrt(eta) and r = (1 - sqrt(eta)) / (1 + sqrt(eta)), a slab
     of thickness t loses -20 lg|(1 - r^2) e^-jq / (1 - r^2 e^-2jq)|, taken apart so that a thick one cannot underflow.
     Source: ITU-R P.2040, 2.2.2.
     """
-
-    __slots__ = ("_frequency_hz", "_max_db", "_r2_imag", "_r2_real", "_root_imag", "_root_real", "_surface_db")
-
-    def __init__(self, material: str, frequency_hz: float) -> None:
-        known = MATERIALS[material]
-        f_ghz = frequency_hz * 1e-9
-        eta = complex(known.a * f_ghz**known.b, -17.98 * known.c * f_ghz**known.d / f_ghz)
-        root = sqrt(eta)
-        r2 = ((1.0 - root) / (1.0 + root)) * ((1.0 - root) / (1.0 + root))
-        self._frequency_hz = frequency_hz
-        self._root_real, self._root_imag = root.real, root.imag
-        self._r2_real, self._r2_imag = r2.real, r2.imag
-        self._surface_db = 20.0 * log10(abs(1.0 - r2))
-        self._max_db = inf if known.max_db is None else known.max_db
-
-    def loss_db(self, thickness_m: float) -> float:
-        """Return the loss in dB of a wave that crosses a slab at a right angle."""
-        assert thickness_m >= 0.0, thickness_m
-        turns = 2.0 * pi * thickness_m * self._frequency_hz / LIGHT_M_S
-        q_real, q_imag = turns * self._root_real, turns * self._root_imag
-        absorbed_db = -q_imag * 20.0 * LG_E
-        echo_real = echo_imag = 0.0
-        if q_imag > -300.0:
-            size = exp(2.0 * q_imag)
-            real, imag = size * cos(-2.0 * q_real), size * sin(-2.0 * q_real)
-            echo_real = self._r2_real * real - self._r2_imag * imag
-            echo_imag = self._r2_real * imag + self._r2_imag * real
-        loss_db = absorbed_db - self._surface_db + 20.0 * log10(abs(complex(1.0 - echo_real, -echo_imag)))
-        return min(max(loss_db, 0.0), self._max_db)
-
-
-@lru_cache(maxsize=1_024)
-def slab(material: str, frequency_hz: float) -> Slab:
-    """Return the slabs of a material in MATERIALS at a frequency."""
-    return Slab(material, frequency_hz)
-
-
-def slab_loss_db(material: str, thickness_m: float, frequency_hz: float) -> float:
-    """Return the loss in dB of a wave that crosses a slab of a material in MATERIALS at a right angle."""
-    return slab(material, frequency_hz).loss_db(thickness_m)
+    assert thickness_m >= 0.0, thickness_m
+    root, r2, surface_db, max_db = _slab(material, frequency_hz)
+    turns = 2.0 * pi * thickness_m * frequency_hz / LIGHT_M_S
+    q_real, q_imag = turns * root.real, turns * root.imag
+    absorbed_db = -q_imag * 20.0 * LG_E
+    echo_real = echo_imag = 0.0
+    if q_imag > -300.0:
+        size = exp(2.0 * q_imag)
+        real, imag = size * cos(-2.0 * q_real), size * sin(-2.0 * q_real)
+        echo_real = r2.real * real - r2.imag * imag
+        echo_imag = r2.real * imag + r2.imag * real
+    loss_db = absorbed_db - surface_db + 20.0 * log10(abs(complex(1.0 - echo_real, -echo_imag)))
+    return min(max(loss_db, 0.0), max_db)

@@ -38,6 +38,4 @@ def level_of(power: int) -> float:
 
 def ratio_cdb(received_cdbm: int, noise_cdbm: int, interference: int) -> int:
     """Return the ratio of a signal to noise and interference (units of 1e-21 W), in hundredths of a dB."""
-    if not interference:
-        return received_cdbm - noise_cdbm
     return received_cdbm - centi(level_of(units_of(noise_cdbm) + interference))

@@ -30,13 +30,13 @@ from foosim.world.matter.materials import RadioMaterial
 from foosim.world.scene import Vector
 
 OLDER_MAX: Final = 1024
-"""So many former places are remembered; then they are forgotten."""
+"""At this count of remembered former places all are forgotten."""
 BLOCKED: Final = "blocked"
 OUT_OF_RANGE: Final = "out_of_range"
 NEVER_CDB: Final = 10**6
-"""A loss that nothing gets over."""
+"""A loss that no signal exceeds."""
 LOSS_MAX_DB: Final = 400
-"""More than this is not told from it, where it is asked whether no more is lost."""
+"""Losses above this count as equal when bounding reach."""
 
 
 def _distance_m(a: Vector, b: Vector) -> float:
@@ -86,7 +86,7 @@ class Place:
         self.of_los = self.of_nlos = 0.0
         """The fields of shadowing with and without line of sight, where they are known."""
         self.share_cdb = -1.0
-        """What shadowing adds at most to a loss for this end's part; below 0 before somebody has asked."""
+        """What shadowing adds at most to a loss for this end's part; below 0 until it is computed."""
 
 
 class _Way:
@@ -159,13 +159,13 @@ class Propagation:
         self.gain_cdb = centi(settings.antenna.gain_dbi)
         self.sense_cdbm = centi(settings.sense_dbm)
         self._places: dict[str, Place] = {}
-        """Of each endpoint, the newest that somebody has asked for."""
+        """The newest of each endpoint."""
         self._older: dict[tuple[str, Vector], Place] = {}
-        """Where others were when they sent what is still on air: asked for again with each packet."""
+        """Where senders were whose transmissions are still on air."""
         self._ways: dict[tuple[str, str], _Way] = {}
         self._reaches = [-1.0] * (LOSS_MAX_DB + 1)
-        """The square of the distance (m2) within which walls and distance take no more than so many dB; below 0 before
-        somebody has asked."""
+        """The square of the distance (m2) within which walls and distance take at most the index in dB; below 0 until
+        it is computed."""
 
     def place(self, endpoint: str) -> Place:
         """Return where an endpoint's antenna is."""
@@ -238,7 +238,7 @@ class Propagation:
         return not path.cause and path.loss_cdb <= sensed_cdb
 
     def _way(self, one: Place, other: Place) -> _Way:
-        """Return what is remembered of two places' bodies, of which the one is not behind the other."""
+        """Return what is remembered of two places' bodies, the lesser place first."""
         key = one.body, other.body
         found = self._ways.get(key)
         if found is None:

@@ -36,7 +36,7 @@ def _node(key: bytes, lattice: int, i: int, j: int) -> float:
 
 
 class _Lattice:
-    """One of the lattices: its nodes per metre of the plane in units of d_corr, and its cells that were asked for."""
+    """One of the lattices: its nodes per metre of the plane in units of d_corr, and its cells computed so far."""
 
     __slots__ = ("_cells", "_key", "_number", "density")
 

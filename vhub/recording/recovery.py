@@ -208,7 +208,7 @@ class _Completion:
             flights = state.in_flight()
             for flight in flights:
                 flight.cause = IN_FLIGHT
-            ages = state.ages.untold(state.closed)
+            ages = state.ages.unreported(state.closed)
             file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages))
 
     def _told_of(self, file: CaptureFile) -> Iterator[bytes]:

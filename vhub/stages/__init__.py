@@ -14,10 +14,10 @@ from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.radio.propagation import BLOCKED, OUT_OF_RANGE
-from foosim.vhub.stages.admission import NO_ROUTE, NODE_DOWN, TOO_BIG, Admit
+from foosim.vhub.stages.admission import NO_ROUTE, NODE_DOWN, TOO_BIG, Admission
 from foosim.vhub.stages.channel import Channel
-from foosim.vhub.stages.corruption import CRC_FAIL, Mangle
-from foosim.vhub.stages.custom_model import MODEL, MODEL_FAILED, Own
+from foosim.vhub.stages.corruption import CRC_FAIL, Corruption
+from foosim.vhub.stages.custom_model import MODEL, MODEL_FAILED, CustomModel
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.duty import DUTY_CYCLE, Duty
 from foosim.vhub.stages.medium import COLLISION, SNR, make_medium
@@ -28,15 +28,15 @@ from foosim.vhub.stages.residual import BURST_LOSS, RANDOM_LOSS, make_residual
 from foosim.vhub.stages.stage import Stage
 
 STAGES: Final[tuple[tuple[str, Callable[[LinkSetup], Stage | None], tuple[str, ...]], ...]] = (
-    ("admission", Admit.for_link, (TOO_BIG, NODE_DOWN, NO_ROUTE)),
+    ("admission", Admission.for_link, (TOO_BIG, NODE_DOWN, NO_ROUTE)),
     ("policy", Policy.for_link, (PARTITION, FILTERED, EXPIRED)),
     ("duty", Duty.for_link, (DUTY_CYCLE,)),
     ("queue", Queue.for_link, (QUEUE_FULL, CODEL, EXPIRED)),
     ("medium", make_medium, (COLLISION,)),
     ("channel", Channel.for_link, (OUT_OF_RANGE, BLOCKED, SNR, COLLISION)),
     ("residual", make_residual, (RANDOM_LOSS, BURST_LOSS)),
-    ("custom_model", Own.for_link, (MODEL, MODEL_FAILED)),
-    ("corruption", Mangle.for_link, (CRC_FAIL,)),
+    ("custom_model", CustomModel.for_link, (MODEL, MODEL_FAILED)),
+    ("corruption", Corruption.for_link, (CRC_FAIL,)),
     ("delay", Delay.for_link, ()),
     ("receiver", Receiver.for_link, (RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL)),
 )

@@ -10,15 +10,15 @@ from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 TOO_BIG: Final = "too_big"
 NODE_DOWN: Final = "node_down"
 NO_ROUTE: Final = "no_route"
 
 
-class Admit(Stage):
+class Admission(Stage):
     """Compares payloads with the longest one, and checks the sender's body in the newest frame."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -26,7 +26,7 @@ class Admit(Stage):
         self._is_down = setup.world.is_down(setup.source)
 
     @classmethod
-    def for_link(cls, setup: LinkSetup) -> Admit | None:
+    def for_link(cls, setup: LinkSetup) -> Admission | None:
         if not setup.is_routed:
             return NoRoute(setup)
         return cls(setup) if setup.settings.payload_max is not None or setup.world.is_down(setup.source) else None
@@ -36,17 +36,17 @@ class Admit(Stage):
             return TOO_BIG
         return NODE_DOWN if self._is_down else ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row, limit = seen.row, "any size" if self._longest is None else f"at most {self._longest} B"
         state = seen.out_of_service(row.source) if row.cause == NODE_DOWN else "in service"
-        told.say("{size} B of {}, sender {sender}", limit, size=row.size, mtu=self._longest, sender=state)
+        note.add("{size} B of {}, sender {sender}", limit, size=row.size, mtu=self._longest, sender=state)
 
 
-class NoRoute(Admit):
+class NoRoute(Admission):
     """The ends have no radio in common, or not that of their rule."""
 
     def at_sending(self, flight: Flight) -> str:
         return NO_ROUTE
 
-    def explain(self, seen: Seen, told: Told) -> None:
-        told.say("the ends have no radio in common, or not that of their rule", routed=False)
+    def explain(self, seen: Seen, note: Explanation) -> None:
+        note.add("the ends have no radio in common, or not that of their rule", routed=False)

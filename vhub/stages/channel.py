@@ -20,9 +20,9 @@ from foosim.vhub.radio.errors import (
 )
 from foosim.vhub.radio.noise import level_of, units_of
 from foosim.vhub.radio.propagation import BLOCKED, OUT_OF_RANGE
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.medium import COLLISION, SNR, error_curve
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 
 class Channel(Stage):
@@ -53,60 +53,60 @@ class Channel(Stage):
             self._air.settle(flight.due_ns)
         return self._judge(flight) if flight.interference and not flight.is_settled else ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row, settings = seen.row, seen.settings
         walls = self._walls(seen)
-        told.say("{distance_m} m", distance_m=row.distance_mm / 1000.0, walls=walls, line_of_sight=not walls)
-        told.facts["walls_db"] = walls_db = row.walls_cdb / 100.0
+        note.add("{distance_m} m", distance_m=row.distance_mm / 1000.0, walls=walls, line_of_sight=not walls)
+        note.facts["walls_db"] = walls_db = row.walls_cdb / 100.0
         each = ", ".join(name if loss_db is None else f"{name} {loss_db:g} dB" for name, loss_db in walls.items())
-        told.text += f", through {each} ({walls_db:g} dB in all)" if walls else ", in line of sight"
+        note.text += f", through {each} ({walls_db:g} dB in all)" if walls else ", in line of sight"
         if row.cause in (OUT_OF_RANGE, BLOCKED) and not row.received_cdbm:
             range_m = settings.path_loss.range_m
-            told.say(", nothing gets through", range_m=range_m)
-            told.text += f" (range {range_m:g} m)" if range_m is not None and row.cause == OUT_OF_RANGE else ""
+            note.add(", nothing gets through", range_m=range_m)
+            note.text += f" (range {range_m:g} m)" if range_m is not None and row.cause == OUT_OF_RANGE else ""
             return
-        told.say(", path loss {path_loss_db} dB", path_loss_db=row.path_loss_cdb / 100.0)
-        told.say(" (shadowing {shadowing_db}", shadowing_db=row.shadowing_cdb / 100.0)
-        told.say(", fading {fading_db})" if settings.fading is not None else ")", fading_db=row.fading_cdb / 100.0)
-        told.say(", {received_dbm} dBm", received_dbm=row.received_cdbm / 100.0, error_rate=row.error_ppm / 1e6)
-        told.say(" over {noise_dbm} dBm of noise", noise_dbm=self._budget.propagation.noise_cdbm / 100.0)
-        told.say(" is {snr_db} dB", snr_db=row.snr_cdb / 100.0)
+        note.add(", path loss {path_loss_db} dB", path_loss_db=row.path_loss_cdb / 100.0)
+        note.add(" (shadowing {shadowing_db}", shadowing_db=row.shadowing_cdb / 100.0)
+        note.add(", fading {fading_db})" if settings.fading is not None else ")", fading_db=row.fading_cdb / 100.0)
+        note.add(", {received_dbm} dBm", received_dbm=row.received_cdbm / 100.0, error_rate=row.error_ppm / 1e6)
+        note.add(" over {noise_dbm} dBm of noise", noise_dbm=self._budget.propagation.noise_cdbm / 100.0)
+        note.add(" is {snr_db} dB", snr_db=row.snr_cdb / 100.0)
         others_dbm, half_duplex = row.interference_cdbm / 100.0 or None, row.decided_by.collision == "half_duplex"
-        told.facts |= {"interference_dbm": others_dbm, "half_duplex": half_duplex}
+        note.facts |= {"interference_dbm": others_dbm, "half_duplex": half_duplex}
         if half_duplex:
-            told.text += f"; {row.destination} is on air itself meanwhile and hears nothing (half duplex)"
+            note.text += f"; {row.destination} is on air itself meanwhile and hears nothing (half duplex)"
         elif self._factor:
-            self._explain_lora(seen, told)
+            self._explain_lora(seen, note)
         else:
-            self._explain_errors(seen, told)
+            self._explain_errors(seen, note)
 
-    def _explain_errors(self, seen: Seen, told: Told) -> None:
+    def _explain_errors(self, seen: Seen, note: Explanation) -> None:
         row, settings, flight = seen.row, seen.settings, seen.flight
         if row.interference_cdbm:
             flight.received_cdbm, flight.interference = row.received_cdbm, units_of(row.interference_cdbm)
-            told.text += f", others {row.interference_cdbm / 100.0:g} dBm"
-            told.say(" make it {sinr_db} dB", sinr_db=self._budget.ratio_cdb(flight) / 100.0)
+            note.text += f", others {row.interference_cdbm / 100.0:g} dBm"
+            note.add(" make it {sinr_db} dB", sinr_db=self._budget.ratio_cdb(flight) / 100.0)
         if row.cause == OUT_OF_RANGE:
-            told.say(", the receiver needs {sensitivity_dbm} dBm", sensitivity_dbm=settings.sensitivity_dbm)
+            note.add(", the receiver needs {sensitivity_dbm} dBm", sensitivity_dbm=settings.sensitivity_dbm)
         elif row.error_word:
-            told.text += f", error rate {row.error_ppm / 1e6:g}"
+            note.text += f", error rate {row.error_ppm / 1e6:g}"
             if not seen.is_broadcast and settings.medium in ("wifi", "ieee802154"):
-                told.text += " an attempt"
+                note.text += " an attempt"
             else:
-                told.say(", draw {error_draw}", error_draw=int(row.error_word, 16) / UNIT)
+                note.add(", draw {error_draw}", error_draw=int(row.error_word, 16) / UNIT)
 
-    def _explain_lora(self, seen: Seen, told: Told) -> None:
+    def _explain_lora(self, seen: Seen, note: Explanation) -> None:
         row, place = seen.row, self._factor - LORA_FACTORS[0]
         floors = LORA_GATEWAY_SENSITIVITY_DBM if self._is_gateway else LORA_SENSITIVITY_DBM
         floor_dbm = max(floors[place], seen.settings.sensitivity_dbm)
-        told.say(", the receiver needs {sensitivity_dbm} dBm", sensitivity_dbm=floor_dbm)
-        others = told.facts["others"] = {}
+        note.add(", the receiver needs {sensitivity_dbm} dBm", sensitivity_dbm=floor_dbm)
+        others = note.facts["others"] = {}
         levels = zip(LORA_FACTORS, row.decided_by.by_factor_cdbm, LORA_ISOLATION_DB[place], strict=False)
         for factor, level, needed_db in levels:
             if level:
                 dbm, ratio_db = level / 100.0, round(row.received_cdbm / 100.0 - level / 100.0, 2)
                 others[factor] = {"dbm": dbm, "ratio_db": ratio_db, "needed_db": float(needed_db)}
-                told.text += f", others at SF{factor} {dbm:g} dBm: {ratio_db:g} dB over them of {needed_db} dB needed"
+                note.text += f", others at SF{factor} {dbm:g} dBm: {ratio_db:g} dB over them of {needed_db} dB needed"
 
     def _walls(self, seen: Seen) -> dict[str, float | None]:
         """Return what is in the way, with what each takes in dB; None where it is not known any more.

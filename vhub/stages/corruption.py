@@ -6,6 +6,7 @@ the packet's own draws, so that a replay flips the same bits.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import sqrt
 from typing import Final
 
@@ -13,19 +14,24 @@ from foosim.common.keyed_random import UNIT, Slot, chance_threshold
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.series_math import exp, ln, ln_gamma
+from foosim.vhub.stages.explanation import Explanation, Seen, beside
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told, beside
 
 CRC_FAIL: Final = "crc_fail"
 FLIP_BLOCK: Final = 1024
 """The blocks of a packet's draws from here on select the flipped bits."""
-SIZES_KEPT: Final = 1024
 MEAN_SMALL: Final = 400.0
 DEVIATIONS: Final = 12.0
 """Fewer flipped bits than the mean less this many deviations: less likely than 2^-64."""
 
 
-class Mangle(Stage):
+@lru_cache(maxsize=1_024)
+def error_threshold(bit_error_rate: float, bits: int) -> int:
+    """Return the probability of any error in a number of bits, in units of 2^-64."""
+    return chance_threshold(1.0 - exp(bits * ln(1.0 - bit_error_rate)))
+
+
+class Corruption(Stage):
     """Flips bits of a packet, or drops it for them; decides whether it is duplicated."""
 
     def __init__(self, setup: LinkSetup) -> None:
@@ -34,17 +40,16 @@ class Mangle(Stage):
         self._error_rate = 0.0 if corrupt is None else corrupt.bit_error_rate
         self._delivers = corrupt is not None and corrupt.deliver
         self._doubled = chance_threshold(setup.settings.duplicate)
-        self._thresholds: dict[int, int] = {}
 
     @classmethod
-    def for_link(cls, setup: LinkSetup) -> Mangle | None:
+    def for_link(cls, setup: LinkSetup) -> Corruption | None:
         settings = setup.settings
         errors = settings.corrupt is not None and settings.corrupt.bit_error_rate > 0.0
         return cls(setup) if errors or settings.duplicate > 0.0 else None
 
     def at_sending(self, flight: Flight) -> str:
         words, bits = flight.words, 8 * len(flight.payload)
-        if self._error_rate and bits and words[Slot.CORRUPT] < self._threshold(bits):
+        if self._error_rate and bits and words[Slot.CORRUPT] < error_threshold(self._error_rate, bits):
             if not self._delivers:
                 return CRC_FAIL
             self._flip(flight, bits)
@@ -53,30 +58,21 @@ class Mangle(Stage):
             self._setup.memory.copies += 1
         return ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row, words = seen.row, seen.flight.words
-        told.facts["bits_flipped"] = row.bits_flipped
+        note.facts["bits_flipped"] = row.bits_flipped
         parts = []
         if seen.settings.corrupt is not None:
             rate, bits, draw = self._error_rate, 8 * row.size, words[Slot.CORRUPT]
-            threshold = self._threshold(bits) if rate else 0
+            threshold = error_threshold(self._error_rate, bits) if rate else 0
             flipped = "some" if row.cause == CRC_FAIL else str(row.bits_flipped)
-            told.facts |= {"error_rate": threshold / UNIT, "error_draw": draw / UNIT}
+            note.facts |= {"error_rate": threshold / UNIT, "error_draw": draw / UNIT}
             parts.append(f"{flipped} bits flipped: {beside(draw, threshold)}, {rate:g} a bit in {bits}")
         if self._doubled and row.copy == 0 and row.cause != CRC_FAIL:
             draw = words[Slot.DUPLICATE]
             copied = "a copy" if draw < self._doubled else "no copy"
             parts.append(f"{copied}: draw {draw / UNIT:g}, {seen.settings.duplicate:g}")
-        told.text = ", ".join(parts) or "a copy is not copied again"
-
-    def _threshold(self, bits: int) -> int:
-        """Return the probability of any error in so many bits, in units of 2^-64."""
-        found = self._thresholds.get(bits)
-        if found is None:
-            if len(self._thresholds) >= SIZES_KEPT:
-                self._thresholds.clear()
-            found = self._thresholds[bits] = chance_threshold(1.0 - exp(bits * ln(1.0 - self._error_rate)))
-        return found
+        note.text = ", ".join(parts) or "a copy is not copied again"
 
     def _flip(self, flight: Flight, bits: int) -> None:
         count = min(bits, self._count(flight.words[Slot.CORRUPT], bits))

@@ -1,8 +1,8 @@
 """Custom link model: a user's code decides packets that have passed the stages before.
 
-It is given the world of the newest frame, the packet's own draws and what it has left as memory; what it says is
-checked. A model that breaks its word, or raises, is a failure of the run: the packet is lost (`model_failed`), and the
-vHub ends the run in order. Neighbour: `link_models` (what a model is, and how one is found).
+It gets the world of the newest frame, the packet's own draws and its memory of the packet before; its answer is
+checked. A model that raises or gives an invalid answer is a failure of the run: the packet is lost (`model_failed`),
+and the vHub ends the run in order. Neighbour: `network/custom_models` (the interface of a model, and its loading).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from foosim.vhub.network.custom_models import VERSION_KEY, End, Judged, LinkMode
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.propagation import crossing_db
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 MODEL: Final = "model"
 MODEL_FAILED: Final = "model_failed"
@@ -33,7 +33,7 @@ DEPTH_MAX: Final = 16
 """Of lists and dicts in a memory."""
 
 
-class Own(Stage):
+class CustomModel(Stage):
     """Calls the model of one link."""
 
     def __init__(self, setup: LinkSetup, model: LinkModel) -> None:
@@ -46,7 +46,7 @@ class Own(Stage):
         self._trace = Trace()
 
     @classmethod
-    def for_link(cls, setup: LinkSetup) -> Own | None:
+    def for_link(cls, setup: LinkSetup) -> CustomModel | None:
         return None if setup.model is None else cls(setup, setup.model)
 
     def at_sending(self, flight: Flight) -> str:
@@ -58,19 +58,19 @@ class Own(Stage):
         except Exception as error:  # noqa: BLE001  # raised by a user's code
             problem = f"{type(error).__name__}: {show(str(error), SHOWN_MAX)}"
         if problem:
-            self._tell(flight, problem)
+            self._report(flight, problem)
             return MODEL_FAILED
         memory.model = kept
         flight.model_ns = judged.extra_ns
         return MODEL if judged.is_dropped else ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         model = self._setup.settings.model
         assert model is not None, "a link with a model of one's own"
         package = seen.evidence.versions.get(VERSION_KEY + model.name, "")
-        told.say("{model} of {package}", model=model.name, parameters=dict(model.parameters), package=package)
+        note.add("{model} of {package}", model=model.name, parameters=dict(model.parameters), package=package)
         failed = ", which failed" if seen.row.cause == MODEL_FAILED else ""
-        told.say("{}, {extra_ns} more delay", failed, extra_ns=seen.row.model_ns)
+        note.add("{}, {extra_ns} more delay", failed, extra_ns=seen.row.model_ns)
 
     def _passage(self, flight: Flight) -> Passage:
         source, destination = self._end(flight.source), self._end(flight.destination)
@@ -97,7 +97,7 @@ class Own(Stage):
         world = self._setup.world
         return End(endpoint, world.antenna(endpoint, self._mount), world.velocity(endpoint))
 
-    def _tell(self, flight: Flight, problem: str) -> None:
+    def _report(self, flight: Flight, problem: str) -> None:
         """End the run at the first failure: its network would not be the requested one."""
         model, faults = self._setup.settings.model, self._setup.faults
         if model is not None and not faults:
@@ -106,12 +106,12 @@ class Own(Stage):
             faults.append(f"link model {model.name} failed on packet {packet}, {when}: {problem}")
 
 
-def problem_of(said: object) -> str:
+def problem_of(answer: object) -> str:
     """Return what is wrong with a model's answer; empty for a valid one."""
-    if not isinstance(said, Judged):
-        return f"it returns {type(said).__name__}, not Judged"
-    answer: tuple[Any, ...] = said  # a tuple holds whatever it was made with
-    is_dropped, extra_ns, memory = answer
+    if not isinstance(answer, Judged):
+        return f"it returns {type(answer).__name__}, not Judged"
+    fields: tuple[Any, ...] = answer  # a tuple holds values of any type
+    is_dropped, extra_ns, memory = fields
     if not isinstance(is_dropped, bool):
         return f"is_dropped is {show(is_dropped)}, not True or False"
     if type(extra_ns) is not int or not 0 <= extra_ns <= EXTRA_NS_MAX:

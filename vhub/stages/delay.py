@@ -1,8 +1,8 @@
 """Delay: queue, access, airtime and propagation, the constant delay, a model's, jitter, clogs; then the link's order.
 
-Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo unless
-they say otherwise. A clog that is asked for, or healed, while packets are on their way moves their due times: as if it
-had been known when they were sent.
+Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo by
+default. A request that begins or heals a clog moves the due times of packets in flight, as if it had been known when
+they were sent.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from foosim.common.keyed_random import Slot, chance_threshold
 from foosim.vhub.network.jitter import interpolate_ns
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.explanation import Explanation, Seen, exact
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told, exact
 
 _JITTER: Final = int(Slot.JITTER)
 
@@ -45,7 +45,7 @@ class Delay(Stage):
         late = settings.jitter is not None or settings.reorder is not None or settings.burst is not None
         if timed or late or settings.delay_ns or setup.holds or setup.model is not None:
             return cls(setup)
-        return Behind(setup) if settings.order == "fifo" and setup.memory.last_due_ns >= 0 else None
+        return InOrder(setup) if settings.order == "fifo" and setup.memory.last_due_ns >= 0 else None
 
     def at_sending(self, flight: Flight) -> str:
         spent_ns = flight.phase_ns + flight.queue_ns + flight.access_ns + flight.airtime_ns + flight.propagation_ns
@@ -71,7 +71,7 @@ class Delay(Stage):
             self.plan(flight)
         return ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row = seen.row
         parts = {
             "phase": row.phase_ns,
@@ -87,9 +87,9 @@ class Delay(Stage):
             "clog": row.held_ns,
         }
         parts["order, behind the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
-        told.facts = {what: ns for what, ns in parts.items() if ns}
-        text = " + ".join(f"{what} {exact(ns)}" for what, ns in told.facts.items()) or "no delay"
-        told.say("{} = due {due_ns}", text, due_ns=row.due_ns)
+        note.facts = {what: ns for what, ns in parts.items() if ns}
+        text = " + ".join(f"{what} {exact(ns)}" for what, ns in note.facts.items()) or "no delay"
+        note.add("{} = due {due_ns}", text, due_ns=row.due_ns)
 
     def plan(self, flight: Flight) -> None:
         """Delay a packet whose turn on the air is deferred."""
@@ -99,7 +99,7 @@ class Delay(Stage):
     def put_off(self, flight: Flight, by_ns: int, last_ns: dict[int, int]) -> None:
         """Delay a packet; `last_ns` are the due times of the deferred ones before it, by link.
 
-        It is called in the order of sending, also of those behind them that are not.
+        It is called in the order of sending, also for later packets that are not deferred.
         """
         free_ns = flight.due_ns - flight.held_ns + by_ns
         due_ns = self._held_ns(free_ns) if self._holds else free_ns
@@ -119,7 +119,7 @@ class Delay(Stage):
     def retime(self, flights: Iterable[tuple[Flight, bool]], now_ns: int) -> None:
         """Set the due times of packets in flight, in the order of sending, by the present clogs.
 
-        Each comes with whether those behind it overtake it. What is due already, and waits for its receiver, stays.
+        Each comes with whether later packets may overtake it. Packets that are due and wait for their receiver stay.
         """
         last_ns = -1
         for flight, is_late in flights:
@@ -128,7 +128,7 @@ class Delay(Stage):
             free_ns = flight.due_ns - flight.held_ns
             flight.due_ns = self._held_ns(free_ns)
             if not is_late:
-                last_ns = flight.due_ns = self._in_order(flight.due_ns, last_ns)
+                last_ns = flight.due_ns = max(flight.due_ns, last_ns + 1) if self._fifo else flight.due_ns
             flight.held_ns = flight.due_ns - free_ns
         if self._fifo:
             self._memory.last_due_ns = max(last_ns, min(self._memory.last_due_ns, now_ns))
@@ -144,11 +144,8 @@ class Delay(Stage):
                 due_ns = end_ns
         return due_ns
 
-    def _in_order(self, due_ns: int, last_ns: int) -> int:
-        return max(due_ns, last_ns + 1) if self._fifo else due_ns
 
-
-class Behind(Delay):
+class InOrder(Delay):
     """The stage of a link without delays that had some: packets arrive after earlier ones, otherwise at once."""
 
     def at_sending(self, flight: Flight) -> str:

@@ -2,7 +2,7 @@
 
 In no window of the given length, wherever it begins, is the radio on air for more than its share; of what is on air at
 the window's edge the part within counts. Source: ETSI EN 300 220-1, where the duty cycle is the time on air in an
-observation interval over that interval's length, one hour unless said otherwise (recalled, unverified).
+observation interval over that interval's length, one hour by default (recalled, unverified).
 It is for media on which a packet is sent once, for a time that is known before: LoRa, and a radio with a rate.
 """
 
@@ -14,8 +14,8 @@ from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.memory import RadioState, Sending
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 DUTY_CYCLE: Final = "duty_cycle"
 RUNS_MAX: Final = 1_024
@@ -69,12 +69,12 @@ class Duty(Stage):
             return DUTY_CYCLE
         return ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row, share = seen.row, self._settings.duty_cycle
-        told.say("{} of any {window_ns} on air", f"{100 * share:g} %", window_ns=self._window_ns, duty_cycle=share)
-        told.say(", the packet takes {airtime_ns}", airtime_ns=self.airtime_ns(row.size, row.published))
+        note.add("{} of any {window_ns} on air", f"{100 * share:g} %", window_ns=self._window_ns, duty_cycle=share)
+        note.add(", the packet takes {airtime_ns}", airtime_ns=self.airtime_ns(row.size, row.published))
         if row.cause == DUTY_CYCLE:
-            told.say(", {left_ns} is left of the one that ends with it", left_ns=row.decided_by.duty_left_ns)
+            note.add(", {left_ns} is left of the one that ends with it", left_ns=row.decided_by.duty_left_ns)
 
     def airtime_ns(self, size: int, published: bool) -> int:
         """Return the airtime of a payload of `size` bytes."""

@@ -43,8 +43,8 @@ from foosim.vhub.radio.timings import (
     with_category,
 )
 from foosim.vhub.stages.duty import note_sent
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 COLLISION: Final = "collision"
 SNR: Final = "snr"
@@ -81,8 +81,8 @@ class Wire(Stage):
         sender.waiting.append((end_ns, size))
         return ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
-        _tell_airtime(seen, told, "wire")
+    def explain(self, seen: Seen, note: Explanation) -> None:
+        _explain_airtime(seen, note, "wire")
 
     def _opportunity_ns(self, ready_ns: int, size: int) -> int:
         """Return when the last byte leaves; the next packet uses the rest of the opportunity."""
@@ -141,21 +141,21 @@ class OnAir(Stage):
             flight.outcome = cause
         return COLLISION if flight.outcome == COLLISION else ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row = seen.row
         others = "no other station" if row.contenders <= 1 else f"{row.contenders} stations contend"
-        told.say("{how}: {}", others, how="broadcast, once" if seen.is_broadcast else "unicast")
-        told.say(", access {access_ns}, {retries} retries, ", access_ns=row.access_ns, retries=row.retries)
-        told.facts["contenders"] = row.contenders
-        _tell_airtime(seen, told, "air")
+        note.add("{how}: {}", others, how="broadcast, once" if seen.is_broadcast else "unicast")
+        note.add(", access {access_ns}, {retries} retries, ", access_ns=row.access_ns, retries=row.retries)
+        note.facts["contenders"] = row.contenders
+        _explain_airtime(seen, note, "air")
         odds = self.odds(max(1, row.contenders), row.size, seen.is_broadcast)
         if odds is None:
             return
         chance = odds[0] / UNIT
-        told.facts |= {"collision_chance": chance, "attempts": (attempts := [*self._attempts(seen, *odds)])}
+        note.facts |= {"collision_chance": chance, "attempts": (attempts := [*self._attempts(seen, *odds)])}
         runs = [(what, len([*those])) for what, those in groupby(attempts)]
-        told.text += "; " + ", ".join(what if count == 1 else f"{count} x {what}" for what, count in runs)
-        told.text += f" (an attempt collides with {chance:g})" if chance else ""
+        note.text += "; " + ", ".join(what if count == 1 else f"{count} x {what}" for what, count in runs)
+        note.text += f" (an attempt collides with {chance:g})" if chance else ""
 
     def _attempts(self, seen: Seen, threshold: int, access_threshold: int) -> Iterator[str]:
         """Yield the result of each attempt of a captured packet: an attempt has four of eight words of a block."""
@@ -171,7 +171,7 @@ class OnAir(Stage):
                 yield "error" if attempt < row.retries or (is_lost and not seen.is_broadcast) else "got across"
 
     def odds(self, contenders: int, size: int, broadcast: bool) -> tuple[int, int] | None:
-        """Return below which words an attempt collides, and finds no free channel; None where nobody contends."""
+        """Return below which words an attempt collides, and finds no free channel; None without contention."""
         return None
 
     def _note(self, flight: Flight, shared: Sending) -> None:
@@ -249,10 +249,10 @@ class OnAir(Stage):
         return lambda block: draw_words(key, number, copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
 
 
-def _tell_airtime(seen: Seen, told: Told, where: str) -> None:
+def _explain_airtime(seen: Seen, note: Explanation, where: str) -> None:
     row = seen.row
-    told.say("{airtime_ns} on the {}", where, airtime_ns=row.airtime_ns)
-    told.say(" at {rate_bps}" if row.rate_bps else "", rate_bps=row.rate_bps)
+    note.add("{airtime_ns} on the {}", where, airtime_ns=row.airtime_ns)
+    note.add(" at {rate_bps}" if row.rate_bps else "", rate_bps=row.rate_bps)
 
 
 def wifi_modes(settings: Radio) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ from typing import Final
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.timeline import FOREVER_NS
+from foosim.vhub.stages.explanation import Explanation, Seen, exact
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told, exact
 
 PARTITION: Final = "partition"
 FILTERED: Final = "filtered"
@@ -45,16 +45,16 @@ class Policy(Stage):
         late = self._ttl_ns is not None and flight.due_ns - flight.sent_ns > self._ttl_ns
         return EXPIRED if late else ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row = seen.row
         event, text = _cut(seen, row.sent_ns)
-        told.say("at sending {}", text, cut_at_sending=event, allow=self._allow, ttl_ns=self._ttl_ns)
-        told.text += "" if self._allow else ", nothing may pass (allow is off)"
+        note.add("at sending {}", text, cut_at_sending=event, allow=self._allow, ttl_ns=self._ttl_ns)
+        note.text += "" if self._allow else ", nothing may pass (allow is off)"
         if row.arrival_tick >= 0:
             event, text = _cut(seen, row.due_ns)
-            told.say(", at arrival {}", text, cut_at_arrival=event)
+            note.add(", at arrival {}", text, cut_at_arrival=event)
             if self._ttl_ns is not None:
-                told.text += f", {exact(row.due_ns - row.sent_ns)} old of at most {exact(self._ttl_ns)}"
+                note.text += f", {exact(row.due_ns - row.sent_ns)} old of at most {exact(self._ttl_ns)}"
 
 
 def _cut(seen: Seen, at_ns: int) -> tuple[str, str]:

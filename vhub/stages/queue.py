@@ -11,11 +11,11 @@ from typing import Final
 
 from foosim.deployment.network.radios import Radio
 from foosim.vhub.network.link_context import LinkSetup
-from foosim.vhub.network.memory import RadioState, Sending
+from foosim.vhub.network.memory import Sending
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.policy import EXPIRED
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 QUEUE_FULL: Final = "queue_full"
 CODEL: Final = "queue_codel"
@@ -72,19 +72,19 @@ class Queue(Stage):
             sender.last.decided_by = flight.decided_by
         return cause
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row, decided, limits = seen.row, seen.row.decided_by, self._shared if seen.is_broadcast else self._own
         if row.cause in (QUEUE_FULL, CODEL):
-            told.say("{packets} packets of ", packets=decided.queue_packets)
-        told.say("{bytes} B before it, waits {wait_ns}", bytes=row.queue_bytes, wait_ns=row.queue_ns)
-        told.say(
+            note.add("{packets} packets of ", packets=decided.queue_packets)
+        note.add("{bytes} B before it, waits {wait_ns}", bytes=row.queue_bytes, wait_ns=row.queue_ns)
+        note.add(
             " (at most {packets_max} packets", packets_max=limits.packets, drop="codel" if limits.codel else "tail"
         )
-        told.say(", {bytes_max} B, {wait_max_ns}", bytes_max=limits.bytes_max, wait_max_ns=limits.wait_ns)
-        told.text += f"; {told.facts['drop']})"
+        note.add(", {bytes_max} B, {wait_max_ns}", bytes_max=limits.bytes_max, wait_max_ns=limits.wait_ns)
+        note.text += f"; {note.facts['drop']})"
         if row.cause == CODEL:
-            told.say(", for {above_ns} above {target_ns}", above_ns=decided.codel_above_ns, target_ns=limits.target_ns)
-            told.say(", drop {drops}", drops=decided.codel_drops, interval_ns=limits.interval_ns)
+            note.add(", for {above_ns} above {target_ns}", above_ns=decided.codel_above_ns, target_ns=limits.target_ns)
+            note.add(", drop {drops}", drops=decided.codel_drops, interval_ns=limits.interval_ns)
 
     def _numbers(self, limits: Limits, cause: str, packets: int, leaves_ns: int) -> tuple[int, ...]:
         """Return the numbers of a drop: packets that wait; for CoDel also the time above target and its count."""
@@ -134,9 +134,4 @@ class Queue(Stage):
         return now_ns >= sender.first_above_ns
 
     def _law(self, limits: Limits, time_ns: int) -> int:
-        return time_ns + int(limits.interval_ns / sqrt(sender_count(self._sender)))
-
-
-def sender_count(sender: RadioState) -> int:
-    """Return CoDel's count, at least 1."""
-    return max(1, sender.drop_count)
+        return time_ns + int(limits.interval_ns / sqrt(max(1, self._sender.drop_count)))

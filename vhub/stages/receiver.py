@@ -7,8 +7,8 @@ from typing import Final
 from foosim.capture.rows import ClientRow
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight, size_of_payload
+from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told
 
 RECEIVER_DOWN: Final = "rx_down"
 RECEIVER_FULL: Final = "rx_full"
@@ -27,23 +27,23 @@ class Receiver(Stage):
     def at_arrival(self, flight: Flight, hindered: str) -> str:
         return hindered
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         row, decided = seen.row, seen.row.decided_by
         if row.cause == TRANSIT_FULL:
-            told.say("what is on its way in the whole run leaves no room for it", due_ns=row.due_ns)
+            note.add("what is on its way in the whole run leaves no room for it", due_ns=row.due_ns)
             return
-        told.say("due {due_ns}, arrives at tick {arrival_tick}", due_ns=row.due_ns, arrival_tick=row.arrival_tick)
+        note.add("due {due_ns}, arrives at tick {arrival_tick}", due_ns=row.due_ns, arrival_tick=row.arrival_tick)
         if row.cause == RECEIVER_DOWN:
-            told.say(", {} {receiver}", row.destination, receiver=_state(seen))
+            note.add(", {} {receiver}", row.destination, receiver=_state(seen))
         elif row.cause == RECEIVER_FULL:
-            told.say(", {message_bytes} B in a message", message_bytes=size_of_payload(row.size))
+            note.add(", {message_bytes} B in a message", message_bytes=size_of_payload(row.size))
             left, share = decided.room_left, decided.room_share
-            told.say(
+            note.add(
                 " in which {} has {room_left} B left of {room_share} B", row.source, room_left=left, room_share=share
             )
-        told.facts["wall_released_ns"] = row.wall_released_ns
+        note.facts["wall_released_ns"] = row.wall_released_ns
         if row.wall_released_ns:
-            told.text += f", left for it at {row.wall_released_ns} ns of the vHub's clock"
+            note.text += f", left for it at {row.wall_released_ns} ns of the vHub's clock"
 
 
 def _state(seen: Seen) -> str:

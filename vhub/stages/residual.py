@@ -15,8 +15,8 @@ from foosim.vhub.network.good_bad_periods import Episodes
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.memory import LinkState
 from foosim.vhub.network.packet import Flight
+from foosim.vhub.stages.explanation import Explanation, Seen, beside
 from foosim.vhub.stages.stage import Stage
-from foosim.vhub.stages.told import Seen, Told, beside
 
 _LOSS: Final = int(Slot.LOSS)
 RANDOM_LOSS: Final = "random_loss"
@@ -56,17 +56,17 @@ class Residual(Stage):
             return ""
         return BURST_LOSS if word < self._burst[bad] else RANDOM_LOSS
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         if self._outages is not None and self._outages.is_bad(seen.row.sent_ns):
-            told.say("an outage, in which all is lost", outage=True)
+            note.add("an outage, in which all is lost", outage=True)
             return
         threshold, draw = self._any[seen.row.is_bad], seen.flight.words[_LOSS]
-        told.say("{state} state", state="bad" if seen.row.is_bad else "good")
-        told.say(", loss {}", beside(draw, threshold), loss_rate=threshold / UNIT, loss_draw=draw / UNIT)
+        note.add("{state} state", state="bad" if seen.row.is_bad else "good")
+        note.add(", loss {}", beside(draw, threshold), loss_rate=threshold / UNIT, loss_draw=draw / UNIT)
 
 
 class InTime(Residual):
-    """Bad times of a link, whoever sends in them."""
+    """Bad times of a link, the same for all its packets."""
 
     def __init__(self, setup: LinkSetup, episodes: Episodes, bad_loss: float) -> None:
         super().__init__(setup, 0.0, bad_loss)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from mypy_extensions import mypyc_attr
 
 from foosim.vhub.network.packet import Flight
-from foosim.vhub.stages.told import Seen, Told
+from foosim.vhub.stages.explanation import Explanation, Seen
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -25,7 +25,7 @@ class Stage:
         """
         return ""
 
-    def explain(self, seen: Seen, told: Told) -> None:
+    def explain(self, seen: Seen, note: Explanation) -> None:
         """Tell what the stage looked at in a captured packet; what its row does not have is computed again."""
 
 

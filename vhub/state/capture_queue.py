@@ -1,7 +1,7 @@
 """The queue of closings for the capture: each is recorded once all packets that it released to clients were sent.
 
 Only then its packets have their times of release. Closings are recorded in the order of their ticks, so one that waits
-delays those behind it.
+delays all later ones.
 """
 
 from __future__ import annotations
@@ -58,8 +58,7 @@ def last_closings(
     not closed have no fates.
     """
     closings = [] if half_closed is None else [half_closed]
-    behind = state.closed + len(closings)
-    for tick in range(behind + 1, end_tick + 1):
+    for tick in range(state.closed + len(closings) + 1, end_tick + 1):
         committed = commits.get(tick)
         if committed is None:
             break
@@ -68,7 +67,7 @@ def last_closings(
     if not closings and closed is not None:
         closings.append(_unjudged(state, commits, closed, now_ns))
     for closing in closings[-1:]:
-        closing.ages = state.ages.untold(state.closed)
+        closing.ages = state.ages.unreported(state.closed)
         for flight in state.in_flight():
             left = flight_of(state_of(flight))
             left.cause = IN_FLIGHT

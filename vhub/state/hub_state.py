@@ -58,9 +58,9 @@ class HubState:
         """The last tick whose deliveries are final. Those after the next tick are empty."""
         self.was_final = False
         """Whether the deliveries of the next tick were final before the last closing."""
-        self.at_door: dict[str, int] = {}
+        self.rejected_on_receipt: dict[str, int] = {}
         """Refusals of packets between closings, by cause: counted by the next closing."""
-        self.refused_at_door: list[tuple[str, int]] = []
+        self.counted_rejections: list[tuple[str, int]] = []
         """The refusals that the last closing counted: an input of it, which the journal has."""
         self.ages = Ages(self.tick_ns)
         self.aged: list[Age] = []
@@ -176,8 +176,8 @@ class HubState:
     def close_robots(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]]) -> Deliveries:
         """The part of phase two that robots wait for: return the deliveries of the next tick; `close_rest` follows."""
         tick = frame.tick
-        self.refused_at_door, self.at_door = sorted(self.at_door.items()), {}
-        for cause, count in self.refused_at_door:
+        self.counted_rejections, self.rejected_on_receipt = sorted(self.rejected_on_receipt.items()), {}
+        for cause, count in self.counted_rejections:
             self.refuse(cause, count)
         sendings = self._sendings = SendOrder()
         has_radios = self.fabric.profiles.on_radio
@@ -239,8 +239,8 @@ class HubState:
     def hears_clients(self) -> bool:
         """Whether the closing of the next tick has joins, leaves and packets of clients as inputs.
 
-        Not where the deliveries behind that tick are final already. No lockstep client is due then, and while a
-        free-running one is here it does not happen: it is for those who come and go that this waits.
+        Not where the deliveries after that tick are final already: then no lockstep client is due and no free-running
+        one takes part, so only joins and leaves wait.
         """
         return self.closed + 1 >= self.final
 
@@ -249,7 +249,7 @@ class HubState:
 
         That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
         filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
-        What a sensor measures besides its rate is for clients, who are asked when they are due.
+        Samples besides a sensor's rate go to clients, which act when they are due.
         """
         if not self._here.is_complete:
             return 0
@@ -272,7 +272,7 @@ class HubState:
 
     def _is_clogged(self, tick: int) -> bool:
         """Whether a clog, which may end at any tick, delays a packet to a robot or to a client that acts at arrival."""
-        if not self.fabric.timeline.has_holds:
+        if not self.fabric.timeline.holds:
             return False
         flights = (flight for arrival, those in self._flights.items() if arrival > tick for flight in those)
         held = (flight for flight in flights if flight.held_ns > 0)
@@ -301,9 +301,9 @@ class HubState:
         self.refusals[cause] = self.refusals.get(cause, 0) + count
         return False
 
-    def refuse_at_door(self, cause: str, count: int = 1) -> None:
+    def reject_on_receipt(self, cause: str, count: int = 1) -> None:
         """Add packets that are refused between closings; the next closing counts them."""
-        self.at_door[cause] = self.at_door.get(cause, 0) + count
+        self.rejected_on_receipt[cause] = self.rejected_on_receipt.get(cause, 0) + count
 
     def _addressed(self, source: str, destination: str, channel: str) -> tuple[str, ...]:
         """Return a packet's receivers: its destination, or the clients that subscribe to the channel, by name.

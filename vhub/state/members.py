@@ -62,7 +62,7 @@ class Member:
         return self.since >= 0
 
     def has_existed_at(self, time_ns: int, tick_ns: int) -> bool:
-        """Whether it exists, and has since this time: what was due before has reached nobody, or another one."""
+        """Whether it exists, and has since this time: packets due before are not its own."""
         return 0 <= self.since * tick_ns <= time_ns
 
     def is_due(self, tick: int) -> bool:

@@ -80,7 +80,7 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     """One closed tick: commit and samples as received, admitted packets, joins and leaves, and the result.
 
     `refused` counts by cause what was refused at the door since the tick before. `owing` left while the tick waited for
-    their Dones: its Go was said to them, and they are gone when what clients sent is judged.
+    their Dones: they were sent its Go, and have left when the packets of clients are judged.
     """
 
     tick: int
@@ -133,8 +133,8 @@ def closing_of(
 ) -> Closing:
     """Return the closing of a committed frame's tick, without its fates; `state` is that before it."""
     delivered = state.deliveries.get(frame.tick - 1, [])
-    told = wall_ns, commit.recovered, chain
-    return Closing(frame, commit.digest, commit.edits, delivered, joins, leaves, [], *told)
+    what = wall_ns, commit.recovered, chain
+    return Closing(frame, commit.digest, commit.edits, delivered, joins, leaves, [], *what)
 
 
 def tick_record(
@@ -148,7 +148,7 @@ def tick_record(
     """Return the record of a closing, which is journalled before its deliveries are sent."""
     sampled = [raw for raw, message in samples if message.digest == closing.digest]
     clients = sorted(admitted.items()), closing.joins, closing.leaves
-    given = state.refused_at_door, deliveries, closing.owing
+    given = state.counted_rejections, deliveries, closing.owing
     return encode(TickRecord(closing.frame.tick, commit, sampled, *clients, *given))
 
 
@@ -192,7 +192,7 @@ class Folded:
 class Fold:
     """Computes the closings of a journal again from its records, the first of which is a head.
 
-    Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those behind
+    Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those after
     it. Raises Malformed when the records are not those of one run of this version.
     """
 
@@ -243,7 +243,7 @@ class Fold:
             state.join(joining, record.tick)
         released = state.close_world(frame, packets, closing.fates, commit.edits)
         count_downlinks(state, frame.tick, released)
-        state.at_door = dict(record.refused)
+        state.rejected_on_receipt = dict(record.refused)
         closing.owing += record.owing
         for name in record.owing:
             state.leave(name)

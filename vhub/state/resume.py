@@ -74,7 +74,7 @@ class Past:
         """Return the first actions: complete the capture, log the position."""
         actions: list[Action | RecordClosing | RecordEpoch] = [*self.kept]
         if self.epoch is not None:
-            actions.append(Log("info", f"goes on behind tick {self.state.closed} in epoch {self.epoch.epoch}"))
+            actions.append(Log("info", f"resumes after tick {self.state.closed} in epoch {self.epoch.epoch}"))
         return actions
 
 
@@ -84,7 +84,7 @@ def recall(
     """Return what the records of a journal say; None when they are of no run or hold nothing.
 
     `captured` is how far the capture is, None when there is none; downlinks of the last `kept_ns` of simulated time
-    are said again. Raises Malformed for the journal of another run, and for one that contradicts itself.
+    are kept to be sent again. Raises Malformed for the journal of another run, and for one that contradicts itself.
     """
     if not records:
         return None
@@ -109,7 +109,7 @@ def recall(
         elif captured is not None and folded.record.tick == captured.tick:
             past.known = folded.closing.frame
     if captured is not None:
-        past.kept = list(_untold(found, closings, captured.epoch))
+        past.kept = list(_not_captured(found, closings, captured.epoch))
     past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
     past.absences = fold.absences
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
@@ -119,7 +119,7 @@ def recall(
     return past
 
 
-def _untold(
+def _not_captured(
     found: Iterable[object], closings: Mapping[int, Closing], epoch: int
 ) -> Iterator[RecordClosing | RecordEpoch]:
     """Yield closings by tick, each followed by the epochs that begin after it, in the order of the journal."""

@@ -19,7 +19,7 @@ class SendOrder:
         self.arrived: list[Flight] = []
         """Packets that reached robots by this closing."""
         self._dropped: list[list[Flight]] = [[]]
-        """Drops of what was judged before the first packet that waits, of that packet, of what came behind it, etc."""
+        """Drops of what was judged before the first packet that waits, of that packet, of the packets after it, etc."""
         self._waiting: list[tuple[int, list[Flight]]] = []
 
     @property

@@ -34,13 +34,13 @@ class Evidence:
 
 
 @dataclass(slots=True)
-class Told:
+class Explanation:
     """What a stage looked at: a text, and its numbers."""
 
     text: str = ""
     facts: dict[str, Any] = field(default_factory=dict)
 
-    def say(self, template: str, *texts: str, **facts: Any) -> None:
+    def add(self, template: str, *texts: str, **facts: Any) -> None:
         """Add facts, and a text: in it `{name}` is a fact with the unit that ends its name, `{}` one of `texts`."""
         self.facts |= facts
         self.text += template.format(*texts, **{name: _shown(name, fact) for name, fact in facts.items()})
