@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from foosim.capture import contents as capture_contents
+from foosim.capture import writer as capture_writer
 from foosim.common import limits
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
@@ -41,8 +42,7 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.vhub.core import HubCore
-from foosim.vhub.recording import writer as capture_writer
-from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.assembly.world import initial_numbers
@@ -314,7 +314,7 @@ LOG_LINES = [("info", "kick-off", 0), ("warning", "late", 3), ("error", "gone", 
 def write_capture(path: Path, run: HubRun) -> Path:
     """Write a run's capture, with three lines of log."""
     metadata = {"run": "run-1", "fingerprint": "00"}
-    writer = CaptureWriter(path, run.deployment, NAME, run.text, metadata)
+    writer = Recorder(path, run.deployment, NAME, run.text, metadata)
     epochs = {epoch.tick: epoch for epoch in run.epochs}
     for closing in run.closings:
         if closing.frame.tick in epochs:

@@ -10,7 +10,7 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.protocol.codec import decode_any
-from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.state.capture_queue import RecordClosing
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.vhub.state.resume import Captured, first_tick_of, recall
@@ -33,11 +33,11 @@ def journal_until(run: HubRun, tick: int) -> list[bytes]:
 def go_on(path: Path, run: HubRun, records: Sequence[bytes]) -> Captured:
     """Go on with an unfinished capture as a vHub does whose journal has these records; return how far it was then."""
     described = run.deployment, NAME, run.text, {"run": "run-1", "fingerprint": "00"}
-    writer = CaptureWriter(path, *described, None, first_tick_of(records))
-    past = recall(run.deployment, "run-1", records, writer.begun_with, 0)
+    writer = Recorder(path, *described, None, first_tick_of(run.deployment, records))
+    past = recall(run.deployment, "run-1", records, writer.captured, 0)
     assert past is not None
     if past.known is not None:
-        writer.keep(Closing(past.known, past.known.digest, [], []))
+        writer.keep(past.known)
     for item in past.kept:
         writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
     known = 0 if past.epoch is None else past.epoch.epoch
@@ -48,7 +48,7 @@ def go_on(path: Path, run: HubRun, records: Sequence[bytes]) -> Captured:
         if closing.frame.tick > past.state.closed:
             writer.keep(closing)
     writer.finish({"reason": "enough"})
-    return writer.begun_with
+    return writer.captured
 
 
 @pytest.mark.parametrize("closed", [0, 1, 9, 26, EPOCH_AT - 1, EPOCH_AT, 44, 62, LAST])
@@ -82,8 +82,8 @@ def test_a_run_that_ends_where_its_journal_does_loses_nothing(chunked: bytes, hu
     file = cut(tmp_path, chunked[: len(chunked) * 2 // 3])
     before, records = rows(file), journal_until(hub_run, 20)
     described = hub_run.deployment, NAME, hub_run.text, {"run": "run-1", "fingerprint": "00"}
-    writer = CaptureWriter(file, *described, None, first_tick_of(records))
-    past = recall(hub_run.deployment, "run-1", records, writer.begun_with, 0)
+    writer = Recorder(file, *described, None, first_tick_of(hub_run.deployment, records))
+    past = recall(hub_run.deployment, "run-1", records, writer.captured, 0)
     assert past is not None and not past.kept and past.state.closed == 20 < writer.begun_with.tick
     flights = past.state.in_flight()
     assert past.committed is not None

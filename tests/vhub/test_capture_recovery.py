@@ -13,17 +13,18 @@ from mcap.reader import make_reader
 from mcap.records import DataEnd
 from mcap.stream_reader import StreamReader
 
+from foosim.capture import index as capture_index
+from foosim.capture.index import UNSYNCED_BYTES
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import MAGIC, McapFile, Message
-from foosim.capture.mcap.scan import UNSYNCED_BYTES
 from foosim.capture.reader import open_capture
 from foosim.common.errors import Refused
 from foosim.runtime.disk import Room
 from foosim.runtime.journal import Journal, JournalError
-from foosim.vhub.recording import recovery, unfinished
+from foosim.vhub.recording import recovery
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import UNCLEAN, Recovered, recover_capture, recovered_path
-from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -158,8 +159,8 @@ def test_bytes_that_were_never_written_are_left_out(
     size = len(chunked) * 2 // 3
     path = cut(tmp_path, chunked[:size] + bytes(20_000))
     assert recovered(path).problem.endswith("there is no journal of it")
-    with pytest.raises(CaptureError, match=r"damaged; \d+ bytes from there on would be lost, no journal has tick \d+"):
-        CaptureWriter(path, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-1"}, None, LAST)
+    with pytest.raises(CaptureError, match=r"cut or damaged; \d+ bytes .* would be lost, no journal has tick \d+"):
+        Recorder(path, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-1"}, None, LAST)
     found = recovered(path, journals)
     assert found.tick == LAST and found.is_whole and open_capture(found.path).finished
 
@@ -256,12 +257,12 @@ def test_a_writer_goes_on_with_what_it_left(
     chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unsynced: int
 ) -> None:
     """As a vHub does that was killed and started again: it feeds all of its journal, and the run goes on."""
-    monkeypatch.setattr(unfinished, "UNSYNCED_BYTES", unsynced)
+    monkeypatch.setattr(capture_index, "UNSYNCED_BYTES", unsynced)
     whole = rows(path, 64)
     for size in (10, first_chunk(chunked), len(chunked) // 2, len(chunked) - 3000):
         going = cut(tmp_path, chunked[:size])
         metadata = {"run": "run-1", "fingerprint": "00"}
-        writer = CaptureWriter(going, hub_run.deployment, "table.yaml", hub_run.text, metadata, None, 0)
+        writer = Recorder(going, hub_run.deployment, "table.yaml", hub_run.text, metadata, None, 0)
         for epoch in hub_run.epochs:
             writer.keep(epoch)
         for closing in hub_run.closings:
@@ -274,8 +275,8 @@ def test_a_writer_goes_on_with_what_it_left(
         assert open_capture(going).about.metadata == open_capture(path).about.metadata
         read_by_others(going)
     with pytest.raises(CaptureError, match="is finished; a capture is never overwritten"):
-        CaptureWriter(going, hub_run.deployment, "table.yaml", hub_run.text, {}, None, 0)
+        Recorder(going, hub_run.deployment, "table.yaml", hub_run.text, metadata, None, 0)
     for_another_run = cut(tmp_path, chunked[: len(chunked) // 2])
     with pytest.raises(CaptureError, match="is that of run run-1, not of run run-2"):
-        CaptureWriter(for_another_run, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-2"}, None, 0)
+        Recorder(for_another_run, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-2"}, None, 0)
     assert for_another_run.read_bytes() == chunked[: len(chunked) // 2]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,29 +12,22 @@ import msgspec
 import pytest
 
 from foosim.capture import contents as capture_contents
+from foosim.capture import index as capture_index
+from foosim.capture import writer as capture_writer
 from foosim.capture.cut import cut_capture
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import McapFile, Message
-from foosim.capture.mcap.writer import McapWriter
-from foosim.capture.parts import Joined, files_from
+from foosim.capture.parts import Joined, files_from, head_of
 from foosim.capture.reader import open_capture, read_about
-from foosim.capture.rows import PROFILE
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.runtime.disk import Level
 from foosim.runtime.journal import Journal
-from foosim.vhub.recording import unfinished
-from foosim.vhub.recording import writer as capture_writer
-from foosim.vhub.recording.file import CaptureFile, Described
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import recover_capture
-from foosim.vhub.recording.split import Split
-from foosim.vhub.recording.writer import CaptureWriter
-from foosim.vhub.state.capture_queue import RecordClosing
-from foosim.vhub.state.records import Closing
-from foosim.vhub.state.resume import first_tick_of, recall
 from tests.vhub.conftest import LOG_LINES, NAME
-from tests.vhub.test_capture_branch import journal_until
+from tests.vhub.test_capture_branch import go_on, journal_until
 from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
 from tests.vhub.test_capture_room import Disk
 
@@ -50,9 +44,9 @@ def split_by(run: HubRun, *sets: str) -> tuple[str, Deployment]:
     return text, load_deployment(text, NAME)
 
 
-def write(path: Path, run: HubRun, *sets: str, until: int | None = None) -> CaptureWriter:
+def write(path: Path, run: HubRun, *sets: str, until: int | None = None) -> Recorder:
     text, deployment = split_by(run, *sets)
-    writer = CaptureWriter(path, deployment, NAME, text, METADATA)
+    writer = Recorder(path, deployment, NAME, text, METADATA)
     epochs = {epoch.tick: epoch for epoch in run.epochs}
     for closing in run.closings[:until]:
         if closing.frame.tick in epochs:
@@ -183,11 +177,11 @@ def test_a_cut_is_one_file(parts: Path, path: Path, tmp_path: Path) -> None:
 def test_a_file_that_is_missing_is_named(copied: Path) -> None:
     (copied.parent / "run_0003.mcap").unlink()
     for named in ("run.mcap", "run_0001.mcap"):
-        with pytest.raises(CaptureError, match=r"run_0003\.mcap: is missing, run_0004\.mcap goes on behind it"):
+        with pytest.raises(CaptureError, match=r"run_0003\.mcap: is missing, run_0004\.mcap follows it"):
             open_capture(copied.parent / named)
     assert open_capture(copied.parent / "run_0004.mcap").ticks[0] == 40
     copied.unlink()
-    with pytest.raises(CaptureError, match=r"run\.mcap: is missing, run_0001\.mcap goes on behind it"):
+    with pytest.raises(CaptureError, match=r"run\.mcap: is missing, run_0001\.mcap follows it"):
         open_capture(copied)
 
 
@@ -203,27 +197,14 @@ def test_a_file_of_another_run_or_without_its_end_is_refused(copied: Path, hub_r
     second = copied.parent / "run_0002.mcap"
     content = second.read_bytes()
     second.write_bytes(content[: len(content) // 2])
-    with pytest.raises(CaptureError, match=r"run_0002\.mcap: it has no end, and run_0003\.mcap goes on behind it"):
+    with pytest.raises(CaptureError, match=r"run_0002\.mcap: it has no end, and run_0003\.mcap follows it"):
         open_capture(copied)
     second.write_bytes((copied.parent / "run_0004.mcap").read_bytes())
-    with pytest.raises(CaptureError, match=r"run_0002\.mcap: is not what run_0001\.mcap goes on in"):
+    with pytest.raises(CaptureError, match=r"run_0002\.mcap: does not follow run_0001\.mcap"):
         open_capture(copied)
     with pytest.raises(CaptureError, match=r"run_0001\.mcap: exists already"):
         copied.unlink()
         write(copied, hub_run, BY_TIME)
-
-
-@pytest.mark.parametrize("entries", [{"part": "none"}, {"part": "0", "cut_tick": "-1"}, {"part": "0", "cut_tick": ""}])
-def test_a_number_that_is_none_is_refused(tmp_path: Path, hub_run: HubRun, entries: dict[str, str]) -> None:
-    path = tmp_path / "run.mcap"
-    written: list[bytes] = []
-    mcap = McapWriter(written.append, PROFILE)
-    mcap.add_metadata("foosim", entries)
-    mcap.finish()
-    path.write_bytes(b"".join(written))
-    split = Split(path, split_by(hub_run, BY_TIME)[1].capture, 2_000_000)
-    with pytest.raises(CaptureError, match=r"run\.mcap: its (part|cut_tick) is no number, '"):
-        split.take_over(0, 0, is_empty=True)
 
 
 def test_others_of_like_names_are_left_alone(path: Path, tmp_path: Path) -> None:
@@ -244,21 +225,6 @@ def left_behind(parts: Path, folder: Path, count: int, size: int) -> Path:
     if size >= 0:
         (folder / files[count].name).write_bytes(files[count].read_bytes()[:size])
     return folder / parts.name
-
-
-def test_the_first_file_of_a_branch_that_is_gone_on_with_ends_when_it_would_have(
-    hub_run: HubRun, tmp_path: Path
-) -> None:
-    text, deployment = split_by(hub_run, BY_TIME)
-    described = Described(deployment, NAME, text, {**METADATA, "from": "other", "from_tick": "35"})
-    file = CaptureFile(tmp_path / "run.mcap", described)
-    for closing in hub_run.closings[35:38]:
-        file.write(closing)
-    file.end_chunk()
-    file.close()
-    file = CaptureFile(tmp_path / "run.mcap", described, 35)
-    assert [closing.frame.tick for closing in hub_run.closings[38:55] if file.begins_next(closing)] == [50]
-    file.close()
 
 
 def places(parts: Path) -> Iterator[tuple[int, int]]:
@@ -290,63 +256,47 @@ def test_killed_anywhere_the_journal_gives_what_is_missing(
         shutil.rmtree(left.parent)
 
 
-def rows_of_all(path: Path) -> dict[str, list[dict[str, object]]]:
-    """The rows of all files, each as it stands in the file but for what only a clock knew."""
-    out = path.parent / "joined.mcap"
-    cut_capture(path, out)
-    found = rows(out)
-    out.unlink()
-    return found
-
-
 @pytest.mark.parametrize(
-    ("closed", "lefts", "unsynced"),
-    [
-        (9, [(1, -1), (2, 9_000)], 1000),
-        (10, [(4, 30_000)], 1000),
-        (33, [(4, 30_000)], 1 << 23),
-        (LAST, [(6, 60_000)], 1000),
-    ],
+    "killed",
+    [(9, 1, -1, 1000), (9, 2, 9_000, 1000), (10, 4, 30_000, 1000), (33, 4, 30_000, 1 << 23), (LAST, 6, 60_000, 1000)],
 )
-def test_a_vhub_goes_on_with_what_it_left_wherever_its_journal_ends(
+@pytest.mark.parametrize("is_split", [True, False])
+def test_a_restarted_vhub_begins_the_next_file_wherever_its_journal_ends(
     parts: Path,
     path: Path,
     hub_run: HubRun,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    closed: int,
-    lefts: list[tuple[int, int]],
-    unsynced: int,
+    killed: tuple[int, int, int, int],
+    is_split: bool,
 ) -> None:
-    """The machine was lost: files may be further than the journal, whole ones too. Nothing is written twice."""
-    monkeypatch.setattr(unfinished, "UNSYNCED_BYTES", unsynced)
-    text, deployment = split_by(hub_run, BY_TIME)
-    records = journal_until(hub_run, closed)
-    for number, (count, size) in enumerate(lefts):
-        left = left_behind(parts, tmp_path / str(number), count, size)
-        had = int(open_capture(left).ticks[-1])
-        writer = CaptureWriter(left, deployment, NAME, text, METADATA, None, first_tick_of(records))
-        assert writer.begun_with.tick == had
-        past = recall(deployment, "run-1", records, writer.begun_with, 0)
-        assert past is not None
-        if past.known is not None:
-            writer.keep(Closing(past.known, past.known.digest, [], []))
-        for item in past.kept:
-            writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
-        for epoch in hub_run.epochs:
-            if past.epoch is None or epoch.epoch > past.epoch.epoch:
-                writer.keep(epoch)
-        for closing in hub_run.closings:
-            if closing.frame.tick > past.state.closed:
-                writer.keep(closing)
-        writer.finish({"reason": "enough"})
-        made, whole = rows_of_all(left), rows(path)
-        assert names(left) == NAMES and open_capture(left).finished
-        assert [row["tick"] for row in made["/tick"]] == list(range(LAST + 1))
-        for topic in ("/tick", "/packets", "/clients", "/layout", "/scene", "/tf", "/frame"):
-            assert made[topic] == whole[topic], (topic, count, size)
-        assert len(made["/epochs"]) == len(whole["/epochs"])
-        assert capture_info(left).chain == capture_info(path).chain
+    """The machine was lost: files may be further than the journal, whole ones too. No row is written twice.
+
+    `killed`: the journal's last tick, the number and the size of the last file, the bytes of it that were not synced.
+
+    Without a split the ordered end joins the files to one.
+    """
+    closed, count, size, unsynced = killed
+    monkeypatch.setattr(capture_index, "UNSYNCED_BYTES", unsynced)
+    left = left_behind(parts, tmp_path / "left", count, size)
+    before = {file: file.read_bytes() for file in files_from(left)}
+    had = int(open_capture(left).ticks[-1])
+    text, deployment = split_by(hub_run, BY_TIME) if is_split else (hub_run.text, hub_run.deployment)
+    go_on(left, replace(hub_run, text=text, deployment=deployment), journal_until(hub_run, closed))
+    capture = open_capture(left)
+    assert capture.finished and capture.about.end == open_capture(path).about.end
+    assert joined_rows(left) == joined_rows(path) | {"/epochs": joined_rows(left)["/epochs"]}
+    assert [epoch.epoch for epoch in capture.epochs] == [epoch.epoch for epoch in hub_run.epochs]
+    assert capture_info(left).chain == capture_info(path).chain
+    if not is_split:
+        assert names(left) == [left.name] and read_by_others(left) > 0
+        assert open_capture(left).about.metadata.keys() == open_capture(path).about.metadata.keys()
+        return
+    assert all(file.read_bytes()[: len(content)] == content for file, content in before.items()), "left as they were"
+    (resumed,) = [file for file in files_from(left) if "part_after_bytes" in head_of(file) or file not in before][:1]
+    alone = open_capture(resumed)
+    assert alone.ticks[0] in (had, had + 1) and int(alone.frames.ticks[0]) == alone.ticks[0]
+    assert capture_info(resumed).chain == capture_info(path).chain
 
 
 # --- disks that refuse -----------------------------------------------------------------------------------------------
@@ -403,7 +353,7 @@ def test_only_the_last_is_kept(hub_run: HubRun, path: Path, tmp_path: Path) -> N
     assert info.chain == capture_info(path).chain
     assert messages(run)[-50:] == messages(path)[-50:]
     (tmp_path / "run_0004.mcap").unlink()
-    with pytest.raises(CaptureError, match=r"run_0004\.mcap: is missing, run_0005\.mcap goes on behind it"):
+    with pytest.raises(CaptureError, match=r"run_0004\.mcap: is missing, run_0005\.mcap follows it"):
         open_capture(run)
 
 
@@ -427,7 +377,7 @@ def test_what_was_let_go_does_not_count(hub_run: HubRun, tmp_path: Path) -> None
     sizes = [file.stat().st_size for file in files_from(write(tmp_path / "a" / "run.mcap", hub_run, BY_TIME).path)]
     quota = f"capture.max_bytes={max(sum(sizes[at : at + 4]) for at in range(4)) // 1024 + 40} KiB"
     text, deployment = split_by(hub_run, BY_TIME, "capture.last=20 ms", quota, "capture.reserve=64 KiB")
-    writer = CaptureWriter(tmp_path / "run.mcap", deployment, NAME, text, METADATA)
+    writer = Recorder(tmp_path / "run.mcap", deployment, NAME, text, METADATA)
     for closing in hub_run.closings:
         writer.keep(closing)
     writer.finish()
