@@ -34,7 +34,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import END_METADATA, METADATA, NEXT, files_from, head_of, part_path, parts_at
-from foosim.capture.reader import Scan
+from foosim.capture.reader import About, Scan, deployment_of
 from foosim.capture.rows import (
     EPOCHS,
     FORMAT,
@@ -50,6 +50,7 @@ from foosim.capture.rows import (
 )
 from foosim.capture.shown_readings import ShownReadings
 from foosim.capture.split import Split
+from foosim.common.errors import Failed, Refused
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Epoch
@@ -238,6 +239,11 @@ class CaptureFile:
         self.mcap.end_chunk()
         self._saved = replace(self.done)
 
+    def end_large_chunk(self) -> None:
+        """End the collected chunk if it is as large as a chunk may be."""
+        if self.mcap.chunk_bytes > CHUNK_BYTES:
+            self.end_chunk()
+
     def room(self) -> Room:
         """Return the bytes that can still be written: the lesser of the disk's space and the capture's limit."""
         last = self.mcap.summary_bytes
@@ -271,7 +277,7 @@ class CaptureFile:
             self.done.frame = frame.tick
         self._end(metadata)
         if self._split.number and not self._is_split:
-            with suppress(CaptureError, OSError):  # in several files it is as whole
+            with suppress(Refused, OSError):  # in several files it is as whole
                 self._join()
 
     def _end(self, metadata: Mapping[str, str]) -> None:
@@ -448,6 +454,12 @@ class CaptureFile:
 
     # --- one file of all ---------------------------------------------------------------------------------------------
 
+    def copy(self, message: Message) -> None:
+        """Add a message of another file, of a topic that the deployment has; end a chunk that is large."""
+        if message.topic in self._channels:
+            self._add(message)
+        self.end_large_chunk()
+
     def take(self, path: Path) -> tuple[Mapping[str, str], int, str]:
         """Copy the rows of a capture up to its end or the first damage.
 
@@ -456,17 +468,15 @@ class CaptureFile:
         scan, last, damage = Scan(path), dict[str, bytes](), ""
         try:
             for message in scan.messages():
-                self._add(message)
+                self.copy(message)
                 last[message.topic] = message.data
-                if self.mcap.chunk_bytes > CHUNK_BYTES:
-                    self.end_chunk()
         except CaptureError as error:
             damage = str(error)
         self.done = progress(lambda topic: last.get(topic, b""))
         return scan.about.end, scan.about.unfinished_bytes, damage
 
     def _join(self) -> None:
-        """Replace the files of a finished capture by one. Raises CaptureError, and leaves them as they are."""
+        """Replace the files of a finished capture by one. Raises Refused, and leaves them as they are."""
         room = room_on_disk(self._file, self._reserve)
         if room.left - self.total_bytes < room.reserve:
             return
@@ -479,6 +489,12 @@ class CaptureFile:
         self._is_joined = True
         for file in following:
             file.unlink()
+
+
+def described_as(about: About, own: Mapping[str, str]) -> Described:
+    """Return the description of a capture for another file of its rows, with the `own` metadata of that."""
+    metadata = {key: value for key, value in about.metadata.items() if key not in OWN} | own
+    return Described(deployment_of(about), about.deployment_name, about.deployment_text, metadata, about.versions)
 
 
 def epoch_row(epoch: Epoch) -> EpochRow:
@@ -497,7 +513,7 @@ def frame_row(frame: Frame) -> FrameRow:
 def one_file(out: Path, described: Described) -> Iterator[CaptureFile]:
     """Give the file of a capture that has one file alone; it gets its name `out` when it is finished.
 
-    Raises CaptureError when it cannot be written; nothing of it stays then.
+    Raises Failed when it cannot be written; nothing of it stays then.
     """
     part = out.with_name(f".{out.name}.part")
     capture = described.deployment.capture.model_copy(update=ONE_FILE)
@@ -506,6 +522,9 @@ def one_file(out: Path, described: Described) -> Iterator[CaptureFile]:
         part.unlink()
     try:
         file = CaptureFile(part, described)
+    except CaptureError as error:
+        raise Failed(str(error)) from None
+    try:
         try:
             yield file
         finally:
@@ -513,7 +532,7 @@ def one_file(out: Path, described: Described) -> Iterator[CaptureFile]:
         part.rename(out)
         sync_folder(out.parent)
     except OSError as error:
-        raise CaptureError(f"{out}: cannot be written, {error.strerror}") from None
+        raise Failed(f"{out}: cannot be written, {error.strerror}") from None
     finally:
         with suppress(OSError):
             part.unlink()

@@ -10,9 +10,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.analysis.diff import diff_captures
 from foosim.capture import contents as capture_contents
 from foosim.capture import writer as capture_writer
+from foosim.capture.diff import diff_captures
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import BadBranch, read_branch

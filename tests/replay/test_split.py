@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.analysis.diff import diff_captures
+from foosim.capture.diff import diff_captures
 from foosim.capture.parts import files_from
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import read_branch

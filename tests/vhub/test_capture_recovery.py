@@ -19,7 +19,7 @@ from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import MAGIC, McapFile, Message
 from foosim.capture.reader import open_capture
-from foosim.common.errors import Refused
+from foosim.common.errors import Failed, Refused
 from foosim.runtime.disk import Room
 from foosim.runtime.journal import Journal, JournalError
 from foosim.vhub.recording import recovery
@@ -219,7 +219,7 @@ def test_a_file_that_is_there_is_not_overwritten(chunked: bytes, tmp_path: Path)
     before = found.path.read_bytes()
     with pytest.raises(CaptureError, match=r"cut\.recovered\.mcap: exists already"):
         recover_capture(path)
-    with pytest.raises(CaptureError, match=r"\.new\.mcap\.part: cannot be created"):
+    with pytest.raises(Failed, match=r"\.new\.mcap\.part: cannot be created"):
         recover_capture(path, out=path / "new.mcap")
     assert found.path.read_bytes() == before
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from msgspec import Struct
 
-from foosim.analysis.export import export_capture
+from foosim.capture.export import export_capture
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.common.errors import BadValue, DeploymentError, Malformed, Refused, UnknownName

@@ -17,10 +17,10 @@ from typing import Final
 
 import msgspec
 
-from foosim.capture.contents import CHUNK_BYTES, check_new
-from foosim.capture.file import CaptureFile, Described, Line, one_file
+from foosim.capture.contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, check_new
+from foosim.capture.file import CaptureFile, Line, described_as, one_file
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.parts import AFTER, AFTER_BYTES, LAST, PART, files_from, whole_path
+from foosim.capture.parts import files_from, whole_path
 from foosim.capture.reader import TICK_MARKS, About, Scan, deployment_of, read_about
 from foosim.capture.rows import TICK
 from foosim.common import limits
@@ -113,9 +113,8 @@ def _recover(about: About, records: Iterable[bytes], out: Path) -> Recovered:
     """Write the new file: the rows that are there, and those that the journal has beyond them."""
     check_new(out)
     deployment = deployment_of(about)
-    metadata = {key: value for key, value in about.metadata.items() if key not in (PART, AFTER, AFTER_BYTES, LAST)}
-    described = Described(deployment, about.deployment_name, about.deployment_text, metadata, about.versions)
-    with one_file(out, described) as file:
+    cut = {key: about.metadata[key] for key in (CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN) if key in about.metadata}
+    with one_file(out, described_as(about, cut)) as file:
         needed = sum(left.stat().st_size for left in files_from(about.path))
         room = room_on_disk(out.parent, deployment.capture.reserve_bytes)
         if room.left - needed < room.reserve:
@@ -161,8 +160,7 @@ class _Completion:
         try:
             for last in fold(self._deployment, self._told_of(file)):
                 file.write(tick_of(last[1], self._plan))
-                if file.mcap.chunk_bytes > CHUNK_BYTES:
-                    file.end_chunk()
+                file.end_large_chunk()
         except (Malformed, JournalError) as error:
             self.problem = f"its journal cannot be used to its end: {error}"
         if last is not None:
