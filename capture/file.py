@@ -493,7 +493,7 @@ class CaptureFile:
 
 def described_as(about: About, own: Mapping[str, str]) -> Described:
     """Return the description of a capture for another file of its rows, with the `own` metadata of that."""
-    metadata = {key: value for key, value in about.metadata.items() if key not in OWN} | own
+    metadata = {**{key: value for key, value in about.metadata.items() if key not in OWN}, **own}
     return Described(deployment_of(about), about.deployment_name, about.deployment_text, metadata, about.versions)
 
 

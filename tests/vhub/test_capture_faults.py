@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import zstandard
 
-from foosim.capture import contents as capture_contents
 from foosim.capture import file as capture_file
 from foosim.capture import writer as capture_writer
 from foosim.capture.info import capture_info
@@ -272,29 +271,6 @@ def test_the_disk_is_asked_for_its_progress_while_a_sync_lasts(
     goes_on.set()
     writer.finish()
     assert not writer.is_syncing
-
-
-class Disk:
-    """A disk that is full after a while."""
-
-    def __init__(self, room: int, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.room = room
-        self._write = capture_contents.write_all
-        monkeypatch.setattr(capture_file, "write_all", self.write)
-
-    def write(self, file: int, content: bytes) -> None:
-        self.room -= len(content)
-        if self.room < 0:
-            raise OSError(28, os.strerror(28))
-        self._write(file, content)
-
-
-def test_a_disk_that_is_full_at_the_start_is_told_at_once(
-    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    Disk(100, monkeypatch)
-    with pytest.raises(CaptureError, match="cannot be written, No space left on device"):
-        new_writer(tmp_path / "full.mcap", hub_run)
 
 
 def test_a_process_that_ends_without_finishing_is_not_held_up(hub_run: HubRun, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 from foosim.capture import contents as capture_contents
 from foosim.capture import file as capture_file
 from foosim.capture import writer as capture_writer
+from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import open_capture
 from foosim.common import limits
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -121,6 +122,14 @@ def test_a_run_that_goes_on_without_its_capture_has_a_valid_one_up_to_there(
     assert capture.finished and 0 < len(capture.ticks) < 65
     assert capture.about.end["reason"] == f"not captured further: {writer.state.text}"
     assert capture.about.end["last_tick"] == str(capture.ticks[-1])
+
+
+def test_a_disk_that_is_full_at_the_start_is_reported_at_once(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Disk(100, monkeypatch)
+    with pytest.raises(CaptureError, match="cannot be written, No space left on device"):
+        new_writer(tmp_path / "full.mcap", hub_run)
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])

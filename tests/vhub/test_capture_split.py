@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,71 +10,27 @@ import msgspec
 import pytest
 
 from foosim.capture import contents as capture_contents
-from foosim.capture import index as capture_index
 from foosim.capture import writer as capture_writer
 from foosim.capture.cut import cut_capture
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import McapFile, Message
-from foosim.capture.parts import Joined, files_from, head_of
+from foosim.capture.parts import Joined, files_from
 from foosim.capture.reader import open_capture, read_about
-from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.schema import Deployment
 from foosim.runtime.disk import Level
 from foosim.runtime.journal import Journal
-from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import recover_capture
-from tests.vhub.conftest import LOG_LINES, NAME
-from tests.vhub.test_capture_branch import go_on, journal_until
-from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
+from tests.vhub.conftest import BY_TIME, LOG_LINES
+from tests.vhub.conftest import write_capture as write
+from tests.vhub.test_capture_recovery import read_by_others
 from tests.vhub.test_capture_room import Disk
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
 
-BY_TIME = "capture.split_time=20 ms"
-"""Ten ticks, as often as a frame is captured: files begin at ticks 10, 20, ..., 60."""
-METADATA = {"run": "run-1", "fingerprint": "00"}
-
-
-def split_by(run: HubRun, *sets: str) -> tuple[str, Deployment]:
-    text = apply_sets(run.text, NAME, sets)
-    return text, load_deployment(text, NAME)
-
-
-def write(path: Path, run: HubRun, *sets: str, until: int | None = None) -> Recorder:
-    text, deployment = split_by(run, *sets)
-    writer = Recorder(path, deployment, NAME, text, METADATA)
-    epochs = {epoch.tick: epoch for epoch in run.epochs}
-    for closing in run.closings[:until]:
-        if closing.frame.tick in epochs:
-            writer.keep(epochs[closing.frame.tick])
-        writer.keep(closing)
-    for line in LOG_LINES:
-        writer.log(*line)
-    writer.finish({"reason": "enough"})
-    return writer
-
 
 def messages(path: Path) -> list[Message]:
     return [content for content in Joined(path).contents() if isinstance(content, Message)]
-
-
-def joined_rows(path: Path, last: int = LAST) -> dict[str, list[object]]:
-    """The rows of all files up to a tick, without the log and the frame that a file ends with between two others."""
-    kept: dict[str, list[object]] = {}
-    for message in messages(path):
-        if message.topic != "/log" and message.log_ns <= last * 2_000_000:
-            kept.setdefault(message.topic, []).append(message)
-    return kept
-
-
-@pytest.fixture(scope="module")
-def parts(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run in seven files; not to be changed."""
-    path = tmp_path_factory.mktemp("split") / "run.mcap"
-    write(path, hub_run, BY_TIME)
-    return path
 
 
 @pytest.fixture
@@ -213,92 +167,6 @@ def test_others_of_like_names_are_left_alone(path: Path, tmp_path: Path) -> None
     assert files_from(tmp_path / "run.mcap") == [tmp_path / "run.mcap"]
 
 
-# --- unclean ends ----------------------------------------------------------------------------------------------------
-
-
-def left_behind(parts: Path, folder: Path, count: int, size: int) -> Path:
-    """What a writer leaves that is killed within the file number `count`, or just before it (size -1)."""
-    folder.mkdir()
-    files = files_from(parts)
-    for file in files[:count]:
-        shutil.copy(file, folder)
-    if size >= 0:
-        (folder / files[count].name).write_bytes(files[count].read_bytes()[:size])
-    return folder / parts.name
-
-
-def places(parts: Path) -> Iterator[tuple[int, int]]:
-    for count, file in list(enumerate(files_from(parts)))[1:]:
-        size = file.stat().st_size
-        for place in ((-1, size // 2), (3, size - 9_000), (9_000, size - 1))[count % 3]:
-            yield count, place
-
-
-def test_killed_anywhere_the_journal_gives_what_is_missing(
-    parts: Path, path: Path, hub_run: HubRun, tmp_path: Path
-) -> None:
-    with Journal(tmp_path / "journals", "vhub") as journal:
-        for record in hub_run.journal:
-            journal.append(record)
-    whole = rows(path)
-    for number, (count, size) in enumerate(places(parts)):
-        left = left_behind(parts, tmp_path / str(number), count, size)
-        found = recover_capture(left, tmp_path / "journals")
-        assert found is not None and found.is_whole and found.tick >= LAST, (count, size)
-        capture = open_capture(found.path)
-        assert capture.finished and capture.ticks.tolist() == list(range(found.tick + 1))
-        assert files_from(found.path) == [found.path] and not open_capture(left).finished
-        made = rows(found.path)
-        assert {topic: len(made[topic]) for topic in ("/tick", "/packets", "/clients", "/epochs", "/layout")} == {
-            topic: len(whole[topic]) for topic in ("/tick", "/packets", "/clients", "/epochs", "/layout")
-        }, (count, size)
-        assert made["/packets"] == whole["/packets"]
-        shutil.rmtree(left.parent)
-
-
-@pytest.mark.parametrize(
-    "killed",
-    [(9, 1, -1, 1000), (9, 2, 9_000, 1000), (10, 4, 30_000, 1000), (33, 4, 30_000, 1 << 23), (LAST, 6, 60_000, 1000)],
-)
-@pytest.mark.parametrize("is_split", [True, False])
-def test_a_restarted_vhub_begins_the_next_file_wherever_its_journal_ends(
-    parts: Path,
-    path: Path,
-    hub_run: HubRun,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    killed: tuple[int, int, int, int],
-    is_split: bool,
-) -> None:
-    """The machine was lost: files may be further than the journal, whole ones too. No row is written twice.
-
-    `killed`: the journal's last tick, the number and the size of the last file, the bytes of it that were not synced.
-
-    Without a split the ordered end joins the files to one.
-    """
-    closed, count, size, unsynced = killed
-    monkeypatch.setattr(capture_index, "UNSYNCED_BYTES", unsynced)
-    left = left_behind(parts, tmp_path / "left", count, size)
-    before = {file: file.read_bytes() for file in files_from(left)}
-    had = int(open_capture(left).ticks[-1])
-    text, deployment = split_by(hub_run, BY_TIME) if is_split else (hub_run.text, hub_run.deployment)
-    go_on(left, replace(hub_run, text=text, deployment=deployment), journal_until(hub_run, closed))
-    capture = open_capture(left)
-    assert capture.finished and capture.about.end == open_capture(path).about.end
-    assert joined_rows(left) == joined_rows(path) | {"/epochs": joined_rows(left)["/epochs"]}
-    assert [epoch.epoch for epoch in capture.epochs] == [epoch.epoch for epoch in hub_run.epochs]
-    assert capture_info(left).chain == capture_info(path).chain
-    if not is_split:
-        assert names(left) == [left.name] and read_by_others(left) > 0
-        assert open_capture(left).about.metadata.keys() == open_capture(path).about.metadata.keys()
-        return
-    assert all(file.read_bytes()[: len(content)] == content for file, content in before.items()), "left as they were"
-    (resumed,) = [file for file in files_from(left) if "part_after_bytes" in head_of(file) or file not in before][:1]
-    alone = open_capture(resumed)
-    assert alone.ticks[0] in (had, had + 1) and int(alone.frames.ticks[0]) == alone.ticks[0]
-    assert capture_info(resumed).chain == capture_info(path).chain
-
-
 # --- disks that refuse -----------------------------------------------------------------------------------------------
 
 
@@ -376,11 +244,7 @@ def test_what_was_let_go_does_not_count(hub_run: HubRun, tmp_path: Path) -> None
     """All files together are larger than the capture may be; those that are there never are."""
     sizes = [file.stat().st_size for file in files_from(write(tmp_path / "a" / "run.mcap", hub_run, BY_TIME).path)]
     quota = f"capture.max_bytes={max(sum(sizes[at : at + 4]) for at in range(4)) // 1024 + 40} KiB"
-    text, deployment = split_by(hub_run, BY_TIME, "capture.last=20 ms", quota, "capture.reserve=64 KiB")
-    writer = Recorder(tmp_path / "run.mcap", deployment, NAME, text, METADATA)
-    for closing in hub_run.closings:
-        writer.keep(closing)
-    writer.finish()
+    writer = write(tmp_path / "run.mcap", hub_run, BY_TIME, "capture.last=20 ms", quota, "capture.reserve=64 KiB")
     assert writer.statistics().refused == 0 and open_capture(tmp_path / "run.mcap").ticks[-1] == 64
     assert writer.statistics().bytes == sum(file.stat().st_size for file in files_from(tmp_path / "run.mcap"))
     without = write(tmp_path / "b" / "run.mcap", hub_run, BY_TIME, quota, "capture.reserve=64 KiB")
