@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from foosim.analysis.new_file import check_name, new_file
+from foosim.capture.new_file import check_name, new_file
 from foosim.common.errors import Failed
 
 if TYPE_CHECKING:

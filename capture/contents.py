@@ -16,6 +16,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import (
     AFTER,
+    AFTER_BYTES,
     FAILED_RUN,
     LAST,
     ORIGIN,
@@ -47,7 +48,7 @@ CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN = "cut_from", "cut_tick", "cut_digest", "cu
 metadata `foosim`."""
 CUT_REASON: Final = "cut"
 """The reason in the metadata at the end of a part."""
-OWN: Final = frozenset({PART, AFTER, LAST, CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN})
+OWN: Final = frozenset({PART, AFTER, AFTER_BYTES, LAST, CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN})
 """The metadata that differ between the files of a capture."""
 
 
@@ -103,10 +104,9 @@ def write_all(file: int, content: bytes) -> None:
         written += os.write(file, content[written:])
 
 
-def check_new(path: Path, *, is_split: bool = False) -> None:
-    """Raise CaptureError when a file exists at the path of a capture, or of a part of a split one."""
-    there = parts_at(path) if is_split else {0: path} if os.path.lexists(path) else {}
-    for found in there.values():
+def check_new(path: Path) -> None:
+    """Raise CaptureError when a file exists at the path of a capture, or where it would continue."""
+    for found in parts_at(path).values():
         raise CaptureError(f"{found}: exists already; a capture is never overwritten")
 
 

@@ -1,38 +1,26 @@
-"""Cuts a part out of a capture: a capture of its own, that begins with a captured frame and has all up to a time.
+"""Cuts a part out of a capture: a capture of its own, from a captured frame to a time.
 
-What was in force at that frame is repeated at the start, as it was written: the layout, the epoch, the clients that
-take part, the scene. Deployment, files and metadata are those of the whole, and the metadata say where the cut begins.
-A run can begin with any of its frames; a verification starts where the run began, unless asked to take its first one.
+The state at that frame is repeated at the start, as it was written: the layout, the epoch, the clients that take part,
+the scene. Deployment, files and metadata are those of the whole; the metadata have the beginning of the cut. A run can
+begin with any of its frames; a verification starts where the run began, or with the first frame if that is requested.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final
 
-from mcap import records
+from msgspec.structs import replace as replace_message
 
-from foosim.capture.contents import (
-    CHUNK_BYTES,
-    CUT,
-    CUT_CHAIN,
-    CUT_DIGEST,
-    CUT_REASON,
-    CUT_TICK,
-    OWN,
-    check_new,
-    declare_topics,
-)
-from foosim.capture.mcap.checks import CHECKS, CaptureError
+from foosim.capture.contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_REASON, CUT_TICK, check_new
+from foosim.capture.file import CaptureFile, described_as, one_file
+from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
-from foosim.capture.mcap.writer import McapWriter
-from foosim.capture.parts import END_METADATA, METADATA, Joined
 from foosim.capture.reader import DECODERS, Scan, chain_at_start, deployment_of, read_about
-from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, PROFILE, RECOVERIES, TICK
-from foosim.capture.shown_readings import shown_topics
+from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK
 from foosim.capture.state_at import ActiveState
-from foosim.common.errors import BadValue, Failed
+from foosim.common.errors import BadValue
 from foosim.common.units import format_ns
 from foosim.world.frame import chain_next
 
@@ -84,22 +72,11 @@ def cut_capture(path: Path, out: Path, from_ns: int | None = None, to_ns: int | 
     check_new(out)
     start, tick_ns, last_tick = _find_start(path, from_ns, to_ns)
     stop_tick = last_tick if to_ns is None else min(last_tick, to_ns // tick_ns)
-    try:
-        with out.open("xb") as stream:
-            mcap = McapWriter(lambda content: _write(stream, content), PROFILE)
-            _Copy(path, mcap, start, tick_ns, stop_tick).run()
-            mcap.finish()
-        return Cut(out, start.tick, stop_tick, tick_ns, mcap.messages, mcap.offset)
-    except OSError as error:
-        out.unlink(missing_ok=True)
-        raise Failed(f"{out}: cannot be written, {error.strerror}") from None
-    except BaseException:
-        out.unlink(missing_ok=True)
-        raise
-
-
-def _write(stream: BinaryIO, content: bytes) -> None:
-    stream.write(content)
+    cut = {CUT: path.name, CUT_TICK: str(start.tick), CUT_DIGEST: start.digest.hex(), CUT_CHAIN: start.chain.hex()}
+    with one_file(out, described_as(read_about(path), cut)) as file:
+        _Copy(path, file, start, tick_ns, stop_tick).run()
+        file.finish({"reason": CUT_REASON, "last_tick": str(stop_tick)})
+    return Cut(out, start.tick, stop_tick, tick_ns, file.mcap.messages, file.mcap.offset)
 
 
 def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_Start, int, int]:
@@ -126,13 +103,12 @@ def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_St
 class _Copy:
     """One pass over the whole capture that writes the cut."""
 
-    def __init__(self, path: Path, mcap: McapWriter, start: _Start, tick_ns: int, stop_tick: int) -> None:
+    def __init__(self, path: Path, file: CaptureFile, start: _Start, tick_ns: int, stop_tick: int) -> None:
         self._path = path
-        self._mcap = mcap
+        self._file = file
         self._start = start
         self._tick_ns = tick_ns
         self._stop_tick = stop_tick
-        self._channels = declare_topics(mcap, shown_topics(deployment_of(read_about(path))))
         self._tick = -1
         self._begun = False
         self._head: list[Message] = []
@@ -140,29 +116,9 @@ class _Copy:
 
     def run(self) -> None:
         scan = Scan(self._path)
-        for content in Joined(self._path).contents():
-            if isinstance(content, records.Attachment):
-                self._mcap.add_attachment(content.name, content.media_type, content.data)
-            elif isinstance(content, records.Metadata):
-                self._describe(content)
-            elif not self._take(scan, content):
+        for message in scan.messages():
+            if not self._take(scan, message):
                 break
-        self._mcap.end_chunk()
-        self._mcap.add_metadata(END_METADATA, {"reason": CUT_REASON, "last_tick": str(self._stop_tick)})
-
-    def _describe(self, content: records.Metadata) -> None:
-        if content.name == END_METADATA:
-            return
-        if content.name == CHECKS:
-            self._mcap.add_checks()
-            return
-        metadata = content.metadata
-        if content.name == METADATA:
-            start = self._start
-            cut = {CUT: self._path.name, CUT_TICK: str(start.tick), CUT_DIGEST: start.digest.hex()}
-            metadata = {key: value for key, value in metadata.items() if key not in OWN}
-            metadata |= {**cut, CUT_CHAIN: start.chain.hex()}
-        self._mcap.add_metadata(content.name, metadata)
 
     def _take(self, scan: Scan, message: Message) -> bool:
         """Write a message that belongs to the cut; False behind the last one."""
@@ -173,7 +129,7 @@ class _Copy:
             self._begin_tick()
         if message.topic in _BEFORE_TICK:
             self._head.append(message)
-        elif self._begun and message.topic in self._channels:
+        elif self._begun:
             self._put(message)
         return True
 
@@ -191,9 +147,4 @@ class _Copy:
                 self._put(message, at_ns)
 
     def _put(self, message: Message, at_ns: int | None = None) -> None:
-        log_ns = message.log_ns if at_ns is None else at_ns
-        publish_ns = message.publish_ns if at_ns is None else at_ns
-        channel = self._channels[message.topic]
-        self._mcap.add_message(channel, log_ns, publish_ns, message.sequence, message.data)
-        if self._mcap.chunk_bytes > CHUNK_BYTES:
-            self._mcap.end_chunk()
+        self._file.copy(message if at_ns is None else replace_message(message, log_ns=at_ns, publish_ns=at_ns))

@@ -1,8 +1,8 @@
-"""The files of one capture: what they are called, which of them belong together, and all of them read as one.
+"""The files of one capture: their names, which of them belong together, and all of them read as one.
 
-`run.mcap` goes on in `run_0001.mcap`, `run_0002.mcap` and so on. Each can be read by itself: it has the description of
-the run, and its first chunk repeats what holds at its first frame; who comes from the file before passes that chunk by.
-What is read is the file that is named and all behind it.
+`run.mcap` continues in `run_0001.mcap`, `run_0002.mcap` and so on, by size, by time, or because its writer was started
+again. Each can be read by itself: it has the description of the run, and its first chunk repeats the state at its first
+frame; a reader that comes from the file before skips that chunk. A reader reads the given file and all that follow.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, NamedTuple
 from zlib import crc32
 
 from mcap import records
@@ -33,8 +33,10 @@ _BEHIND_FOOTER: Final = 4 + len(MAGIC)
 METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 PART, AFTER, LAST = "part", "part_after", "last"
-"""What each file of a split capture says: its number from 0, the file before, and how long a time is kept where only
-the last is: entries of the metadata `foosim`."""
+"""Entries of the metadata `foosim` of a file of several: its number from 0, the file before, and the time that is kept
+where only the last is."""
+AFTER_BYTES: Final = "part_after_bytes"
+"""Entry of a file that a restarted writer began: the bytes that count of the file before, which has no end."""
 ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
 """Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
 NEXT: Final = "goes_on_in"
@@ -77,12 +79,25 @@ def first_there(path: Path) -> Path:
     return next(iter(parts_at(path).values()), path)
 
 
+class Part(NamedTuple):
+    """One of the files, and its bytes that count, None where all do."""
+
+    path: Path
+    stop: int | None
+
+
 @contextmanager
-def opened(path: Path) -> Iterator[tuple[BinaryIO, int]]:
-    """Give a file to read, and its size in bytes. Raises CaptureError where it cannot be read."""
+def opened(path: Path, stop: int | None = None) -> Iterator[tuple[BinaryIO, int]]:
+    """Give a file to read, and its size in bytes, `stop` where that is given.
+
+    Raises CaptureError where it cannot be read, or is shorter.
+    """
     try:
         with path.open("rb") as stream:
-            yield stream, path.stat().st_size
+            size = path.stat().st_size
+            if stop is not None and size < stop:
+                raise CaptureError(f"{path}: ends at byte {size}, the next file continues at byte {stop}")
+            yield stream, size if stop is None else stop
     except OSError as error:
         raise CaptureError(f"{path}: cannot be read, {error.strerror}") from None
 
@@ -113,33 +128,42 @@ def whole_path(path: Path) -> Path:
 
 
 def files_from(path: Path) -> list[Path]:
-    """Return a file and those behind it. Where the first was let go (`capture.last`), the first that is left.
+    """Return a file and those that follow, as `parts_from` does."""
+    return [part.path for part in parts_from(path)]
+
+
+def parts_from(path: Path) -> list[Part]:
+    """Return a file and those that follow. If the first was removed (`capture.last`), the first that is left.
 
     Raises CaptureError when one of them is missing, or is of another run.
     """
     if not os.path.lexists(path) and (kept := parts_at(path)):
         path, missing = next(iter(kept.values())), path
         if LAST not in head_of(path):
-            raise CaptureError(f"{missing}: is missing, {path.name} goes on behind it")
+            raise CaptureError(f"{missing}: is missing, {path.name} follows it")
     head = head_of(path)
-    if PART not in head:
-        return [path]
-    number = number_of(path, head)
+    number = number_of(path, head) if PART in head else 0
     first = first_path(path, number)
-    files = [path]
-    for found, behind in ({} if first is None else parts_at(first)).items():
-        if found <= number:
-            continue
-        assert first is not None
-        if found != number + len(files):
-            raise CaptureError(f"{part_path(first, number + len(files))}: is missing, {behind.name} goes on behind it")
-        other = head_of(behind)
-        if not other and found == max(parts_at(first)):  # it was just begun
+    following = {} if first is None else {at: file for at, file in parts_at(first).items() if at > number}
+    if following and PART not in head and has_end(path):  # others of like names
+        following = {}
+    parts = [Part(path, None)]
+    for at, file in following.items():
+        other = head_of(file)
+        if not other and at == max(following):  # it was just begun
             break
-        if other.get("run") != head.get("run") or other.get(PART) != str(found):
-            raise CaptureError(f"{behind}: is not what {files[-1].name} goes on in: another run's, or another part")
-        files.append(behind)
-    return files
+        is_next = other.get("run") == head.get("run") and other.get(PART) == str(at)
+        if not is_next and PART not in head and len(parts) == 1:
+            break
+        assert first is not None
+        if at != number + len(parts):
+            raise CaptureError(f"{part_path(first, number + len(parts))}: is missing, {file.name} follows it")
+        if not is_next:
+            raise CaptureError(f"{file}: does not follow {parts[-1].path.name}: it is of another run, or another part")
+        if AFTER_BYTES in other:
+            parts[-1] = Part(parts[-1].path, number_of(file, other, AFTER_BYTES))
+        parts.append(Part(file, None))
+    return parts
 
 
 def end_of(path: Path) -> dict[str, str] | None:
@@ -222,28 +246,29 @@ class Joined:
 
     def contents(self) -> Iterator[Content]:
         """Yield the messages of all files, metadata and attachments of the first one, and the end of the last."""
-        files = files_from(self._path)
-        if len(files) == 1:
-            yield from self._read(files[0])
+        parts = parts_from(self._path)
+        if len(parts) == 1:
+            yield from self._read(parts[0])
             return
-        before, end = files[0], None
-        for path in files:
-            is_behind, has_end, end = path is not files[0], end is not None, None
-            for content in self._read(path):
+        before, end, has_end = parts[0].path, None, True
+        for part in parts:
+            is_behind, end = part is not parts[0], None
+            for content in self._read(part):
                 if isinstance(content, records.Metadata) and content.name == END_METADATA:
                     end = content
                 elif not is_behind:
                     yield content
                 elif isinstance(content, Message):
                     if not has_end:
-                        raise CaptureError(f"{before}: it has no end, and {path.name} goes on behind it")
+                        raise CaptureError(f"{before}: it has no end, and {part.path.name} follows it")
                     yield content
-            before = path
+            before, has_end = part.path, end is not None or part.stop is not None
         if end is not None:
             yield end
 
-    def _read(self, path: Path) -> Iterator[Content]:
-        with opened(path) as (stream, size):
+    def _read(self, part: Part) -> Iterator[Content]:
+        path = part.path
+        with opened(path, part.stop) as (stream, size):
             is_behind = self._first is not None
             file = McapFile(stream, size, str(path), self._since_ns, self._topics)
             file.repeats = is_behind
@@ -252,5 +277,7 @@ class Joined:
             yield from file.contents()
             if is_behind and file.chunk_starts and not file.is_checked:
                 raise CaptureError(f"{path}: it lacks its metadata {CHECKS!r}")
+            if part.stop is not None and file.unfinished_bytes:
+                raise Damaged(f"{path}: byte {file.at}: a damaged record, it is longer than the file")
         self.finished, self.unfinished_bytes = file.finished, file.unfinished_bytes
         self.end_ns = max(self.end_ns, file.end_ns)

@@ -32,6 +32,7 @@ ArithmeticHex = Annotated[str, Meta(pattern="^[0-9a-f]{0,64}$")]
 WordHex = Annotated[str, Meta(extra_json_schema={"type": "string", "pattern": "^([0-9a-f]{16})?$"})]
 """Checked by `capture_columns.word_of` and not with its row: that would take a reader as long as the row's decoding."""
 Fate = Literal["delivered", "dropped", "in_flight"]
+IN_FLIGHT: Final = "in_flight"
 
 
 class Row(msgspec.Struct, frozen=True, gc=False):

@@ -60,7 +60,7 @@ def begin(
     check_free([plan.address] if VHUB in places(plan.deployment) else [plan.address, plan.address.next_port()])
     check_models_here(plan)
     check_players_here(plan)
-    path = check_capture(found, is_split=plan.deployment.capture.is_split) if captures else None
+    path = check_capture(found) if captures else None
     _prepare(check_room(plan, path, runs_folder()), plan, display)
     if detached:
         return detached_outcome(_detach(plan, path, run), plan.deployment, path)

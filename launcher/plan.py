@@ -184,15 +184,14 @@ def check_texts(*paths: Path | None) -> None:
             raise BadValue("a path that is not UTF-8", text) from None
 
 
-def check_capture(path: Path, *, is_split: bool = False) -> Path:
-    """Return the path if no file exists there and its folder, created if missing, is writable; raises Refused.
-
-    For a split capture, no file with the name of a later part may exist either.
+def check_capture(path: Path) -> Path:
+    """Return the path if no file exists there, or where the capture would continue, and its folder, created if missing,
+    is writable; raises Refused.
     """
     from foosim.capture.parts import parts_at
 
     try:
-        for found in parts_at(path).values() if is_split or path.exists() else ():
+        for found in parts_at(path).values():
             raise Refused(f"{found} exists, and a capture is never overwritten")
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):

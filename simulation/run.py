@@ -26,7 +26,7 @@ from foosim.simulation.attendant import Attendant
 from foosim.simulation.stepped_world import deal_robots
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 from foosim.world.start import Start
@@ -101,7 +101,7 @@ def rehearse(  # noqa: PLR0913  # options of a rehearsal, by keyword
 
 def _run(
     system: System,
-    writer: CaptureWriter | None,
+    writer: Recorder | None,
     capture: Path | None,
     progress: Callable[[str], None] | None,
     on_stuck: Callable[[dict[str, Any]], None] | None,
@@ -135,7 +135,7 @@ def _run(
     return told()
 
 
-def _check_room(writer: CaptureWriter, worst: Level) -> None:
+def _check_room(writer: Recorder, worst: Level) -> None:
     """Raise CaptureError when the capture is full and the deployment requires one."""
     if writer.stops_world and writer.state.level >= worst:
         raise CaptureError(f"the rehearsal ends, its capture is full: {writer.state.text}")
@@ -143,11 +143,11 @@ def _check_room(writer: CaptureWriter, worst: Level) -> None:
 
 def _open_capture(
     path: Path, deployment: Deployment, text: str, name: str, settings: Settings, run: RunSettings
-) -> CaptureWriter:
+) -> Recorder:
     """Open a capture that receives all closings and log lines of a rehearsal."""
     metadata = {"run": run.run, "pace": str(run.pace), "fingerprint": library_fingerprint().hex()}
     metadata |= origin_metadata(run.origin)
-    writer = CaptureWriter(path, deployment, name, text, metadata)
+    writer = Recorder(path, deployment, name, text, metadata)
     on_closing, on_epoch, on_log = settings.on_closing, settings.on_epoch, settings.on_log
     tick = 0
 

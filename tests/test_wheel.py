@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from foosim.analysis.diff import diff_captures
+from foosim.capture.diff import diff_captures
 from foosim.simulation.run import rehearse
 from tests.world.test_guide import PACKAGE, USES, examples
 

@@ -56,9 +56,9 @@ from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 from foosim.vhub.network.custom_models import check_link_models
 from foosim.vhub.recording.disk_watch import RoomWatch
-from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
-from foosim.vhub.state.records import Closing, first_head
+from foosim.vhub.state.records import first_head
 from foosim.vhub.state.resume import Captured, first_tick_of, last_tick_of, recall, was_captured
 from foosim.world.components.view import ComponentError
 
@@ -101,7 +101,7 @@ class HubShell:
         self._open_radio = open_radio
         self._inbox = process.inbox
         self._journal: Journal | None = None
-        self._capture: CaptureWriter | None = None
+        self._capture: Recorder | None = None
         self._room: RoomWatch | None = None
         self._forget_ns = self._look_ns = 0
         self._is_closing = False
@@ -281,7 +281,7 @@ class HubShell:
         core.shell.recording = self._room.recording
         past = recall(deployment, build.run, records, captured, deployment.deadlines.client_back_ns)
         if self._capture is not None and past is not None and past.known is not None:
-            self._capture.keep(Closing(past.known, past.known.digest, [], []))  # the frame that the file ends with
+            self._capture.keep(past.known)  # with which the capture that was left ends
         core.begin(past, now_ns)
         for line in start_lines(summaries(deployment), build.deployment_name) if past is None else ():
             self._log.info(line)
@@ -304,7 +304,7 @@ class HubShell:
         path = path or Path("captures") / f"{deployment.world}-{wall_clock.now_stamp()}.mcap"
         self.core.shell.capture, self.core.capture_file = str(options.capture or path), str(path.absolute())
         if before is None:  # a vHub that is killed before the file exists finds here that the path is its own
-            check_new(path, is_split=deployment.capture.is_split)
+            check_new(path)
             assert self._journal is not None
             self._journal.append(first_head(build, deployment, self.core.capture_file))
         metadata = {
@@ -315,9 +315,9 @@ class HubShell:
             **origin_metadata(build.origin),
         }
         described = build.deployment_name, build.deployment, metadata, self._log_text
-        self._capture = CaptureWriter(path, deployment, *described, first_tick_of(records))
+        self._capture = Recorder(path, deployment, *described, first_tick_of(deployment, records))
         self._capture.while_waiting = self._wait_for_capture
-        return self._capture.begun_with
+        return self._capture.captured
 
     def _listen(self, deployment: Deployment) -> None:
         """Open the radio plane to the clients that the deployment declares."""

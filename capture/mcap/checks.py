@@ -31,8 +31,6 @@ _SEALED: Final = "foosim."
 """How the names of metadata begin that must have a digest."""
 _INDEX: Final = struct.Struct("<HI")
 _CRC: Final = struct.Struct("<I")
-_POLYNOMIAL: Final = 0xEDB88320
-"""Of CRC-32, its bits reversed."""
 
 
 class CaptureError(Refused):
@@ -136,29 +134,3 @@ class Span:
             first_ns, last_ns = self._told
             told = f"the chunk at byte {self.at} is from {first_ns} to {last_ns} ns"
             raise ValueError(f"{told}, its indexes from {found[0]} to {found[1]} ns")
-
-
-def combined_crc(first: int, second: int, second_bytes: int) -> int:
-    """Return the CRC-32 of two runs of bytes, one behind the other, from that of each and the second one's length.
-
-    A CRC is the remainder of a polynomial over GF(2): the first one moves up by 8 powers of x for each byte behind it.
-    """
-    shift, power = 1 << 31, 1 << 23  # x^0, and x^8; the lowest power is the highest bit
-    while second_bytes:
-        if second_bytes & 1:
-            shift = _product(power, shift)
-        power = _product(power, power)
-        second_bytes >>= 1
-    return _product(shift, first) ^ second
-
-
-def _product(a: int, b: int) -> int:
-    """Return the product of two polynomials modulo that of CRC-32."""
-    product, bit = 0, 1 << 31
-    while a:
-        if a & bit:
-            product ^= b
-            a ^= bit
-        bit >>= 1
-        b = b >> 1 ^ _POLYNOMIAL if b & 1 else b >> 1
-    return product

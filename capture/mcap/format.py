@@ -35,7 +35,6 @@ MESSAGE_FIELDS: Final = struct.Struct("<HIQQ")
 RECORD: Final = struct.Struct("<BQ")
 INDEX_FIELDS: Final = struct.Struct("<HI")
 CHUNK_FIELDS: Final = struct.Struct("<QQQII")
-CHUNK_HEAD_BYTES_MAX: Final = CHUNK_FIELDS.size + 64  # its fields, and the name of a compression
 PLACE: Final = struct.Struct("<Q")
 FOOTER_FIELDS: Final = struct.Struct("<QQI")
 _CRC: Final = struct.Struct("<I")

@@ -18,7 +18,7 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
-from foosim.capture.mcap.checks import CHECKS, Described, combined_crc, sealed
+from foosim.capture.mcap.checks import CHECKS, Described, sealed
 from foosim.capture.mcap.format import COMPRESSION, LIBRARY, MAGIC, MESSAGE, RECORD, Book
 
 COMPRESSION_LEVEL: Final = 1
@@ -34,41 +34,20 @@ class Record(Protocol):
     def write(self, stream: RecordBuilder) -> None: ...
 
 
-class Earlier(Protocol):
-    """The CRC-32 of so many bytes that a file had before; `value` may wait, and raises OSError."""
-
-    size: int
-
-    def value(self) -> int: ...
-
-
 class McapWriter:
-    """Packs an MCAP file; `write` takes the bytes, in order. Messages are collected until `end_chunk`.
+    """Packs an MCAP file; `write` takes the bytes, in order. Messages are collected until `end_chunk`."""
 
-    With the `book` of an unfinished file (`scan`) it goes on behind what that one has, which is `earlier`.
-    """
-
-    def __init__(
-        self,
-        write: Callable[[bytes], None],
-        profile: str,
-        book: Book | None = None,
-        earlier: Earlier | None = None,
-    ) -> None:
-        assert (book is None) == (earlier is None), "a file that is gone on with has a beginning"
+    def __init__(self, write: Callable[[bytes], None], profile: str) -> None:
         self._write = write
-        self._book = book or Book()
-        self._earlier = earlier
+        self._book = Book()
         self._crc = 0
-        """Of what is written, behind what is earlier."""
         self._described = Described()
         self._compressor = zstandard.ZstdCompressor(level=COMPRESSION_LEVEL)
         self._chunk = bytearray()
-        self._index: dict[int, list[int]] = {channel.id: [] for channel in self._book.channels}
-        """Of each channel: the log time and the place in the chunk of each message, one behind the other."""
-        if book is None:
-            self._put(MAGIC)
-            self._put_record(records.Header(profile, LIBRARY))
+        self._index: dict[int, list[int]] = {}
+        """For each channel the log time and the place in the chunk of each message, alternating."""
+        self._put(MAGIC)
+        self._put_record(records.Header(profile, LIBRARY))
 
     @property
     def chunk_bytes(self) -> int:
@@ -132,7 +111,6 @@ class McapWriter:
 
     def add_checks(self) -> None:
         """Add the digests of the attachments and the checksum of the file so far, once all of them are there."""
-        assert self._earlier is None, "what is earlier has its own"
         self.add_metadata(CHECKS, self._described.entries(self._crc))
 
     def add_message(self, channel: int, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
@@ -227,12 +205,9 @@ class McapWriter:
             del entries[:]
 
     def finish(self) -> None:
-        """Write the last chunk and the summary, which makes the file whole.
-
-        Raises OSError when the beginning of a file that was gone on with cannot be read.
-        """
+        """Write the last chunk and the summary, which makes the file whole."""
         self.end_chunk()
-        self._put_record(records.DataEnd(self._data_crc()))
+        self._put_record(records.DataEnd(self._crc))
         summary_start = self._book.offset
         groups: tuple[tuple[Opcode, list[Record]], ...] = (
             (Opcode.SCHEMA, [*self._book.schemas]),
@@ -255,13 +230,6 @@ class McapWriter:
         self._put(summary)
         self._put_record(records.Footer(summary_start, offset_start, checksum))
         self._put(MAGIC)
-
-    def _data_crc(self) -> int:
-        """Return the CRC-32 of the file so far."""
-        earlier = self._earlier
-        if earlier is None:
-            return self._crc
-        return combined_crc(earlier.value(), self._crc, self._book.offset - earlier.size)
 
     def _statistics(self) -> records.Statistics:
         return records.Statistics(

@@ -12,10 +12,10 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from foosim.analysis.diff import Diff, Difference, diff_captures
-from foosim.analysis.export import STANDARD_OUTPUT, Format, export_capture
-from foosim.analysis.tables import table_names
 from foosim.capture.cut import cut_capture
+from foosim.capture.diff import Diff, Difference, diff_captures
+from foosim.capture.export import STANDARD_OUTPUT, Format, export_capture
+from foosim.capture.tables import table_names
 from foosim.cli.capture.options import Capture, reading, time_of
 from foosim.common.errors import UnknownName
 from foosim.runtime.command import DONE, FAILED, JsonOption, print_json

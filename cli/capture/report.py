@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from foosim.analysis.new_file import check_name, new_file
+from foosim.capture.new_file import check_name, new_file
 from foosim.capture.reader import open_capture
 from foosim.cli.capture.options import Capture, reading
 from foosim.console.report.collect import gather

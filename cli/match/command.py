@@ -13,8 +13,8 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from foosim.analysis.new_file import check_absent
 from foosim.analysis.picture import HELP, check_picture, new_picture
+from foosim.capture.new_file import check_absent
 from foosim.cli.match.shown import Match, as_json, drawn_title, line, show, who
 from foosim.cli.run_command import with_options
 from foosim.client.loading import look_in

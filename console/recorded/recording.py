@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from foosim.capture.columns import frame_of
 from foosim.capture.foxglove import POSES
 from foosim.capture.foxglove_reader import read_poses
+from foosim.capture.index import CaptureIndex
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.reader import (
@@ -32,7 +33,6 @@ from foosim.capture.reader import (
     row_of,
 )
 from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
-from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.shown.drawing import Drawing
 from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame

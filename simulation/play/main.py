@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Final
 
 from foosim.capture.foxglove import SCENE
+from foosim.capture.index import CaptureIndex
 from foosim.capture.reader import About, Scan, deployment_of
-from foosim.capture.state_at import LatchedTopic
 from foosim.common import limits
 from foosim.common.addresses import Address, check_listen, parse_address
 from foosim.common.errors import BadValue, Malformed, Refused
@@ -120,8 +120,9 @@ def read_span(path: Path, from_ns: int | None = None, until_ns: int | None = Non
 def entries_at(path: Path, entries: Entries, time_ns: int) -> Iterator[Entry]:
     """Yield the entries of a capture from a captured time on, first the scene of that time. Raises CaptureError."""
     if time_ns and entries.has_scene:
-        scene = LatchedTopic(path, SCENE).before(time_ns)
-        entry = None if scene is None else entries.view(scene, time_ns)
+        index = CaptureIndex(path, (SCENE,))
+        number = index.places[SCENE].newest(time_ns - 1)
+        entry = entries.view(index.read(SCENE, number), time_ns) if number >= 0 else None
         if entry is not None:
             yield entry
     scan = Scan(path, max(0, time_ns - 2 * entries.tick_ns))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from foosim.analysis import picture
-from foosim.analysis.new_file import Existing
+from foosim.capture.new_file import Existing
 from foosim.common.errors import BadValue, Failed
 from tests.conftest import Typed
 

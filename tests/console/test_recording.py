@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from foosim.capture.foxglove import POSES
+from foosim.capture.index import CaptureIndex
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import files_from, part_path
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import FRAME, ROW_TYPES
-from foosim.console.recorded.capture_index import CaptureIndex
 from foosim.console.recorded.recording import TOPICS, Recording
 from foosim.simulation.verify import Between
 from foosim.world.frame import Frame

@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 from typer.testing import CliRunner
 
 from foosim.capture import contents as capture_contents
+from foosim.capture import writer as capture_writer
 from foosim.capture.contents import declare_topics, write_all
 from foosim.capture.mcap.checks import CHECKS
 from foosim.capture.mcap.format import McapFile, Message
@@ -26,7 +27,6 @@ from foosim.common.errors import Refused
 from foosim.console.report.collect import Report, gather
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import System
-from foosim.vhub.recording import writer as capture_writer
 from foosim.world.edits import Add
 from tests.turns import BY_PERIOD
 

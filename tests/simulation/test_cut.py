@@ -8,9 +8,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.analysis.diff import diff_captures
-from foosim.analysis.export import export_capture
 from foosim.capture.cut import cut_capture
+from foosim.capture.diff import diff_captures
+from foosim.capture.export import export_capture
 from foosim.capture.foxglove import POSES, SCENE
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
@@ -124,14 +124,14 @@ def refusals(run: Path, tmp_path: Path) -> Iterator[tuple[tuple[str | Path, ...]
     yield (run, "--to", "-1 s", "-o", out), "--to: a time that is not negative is needed"
     yield (run, "--from", "300 ms", "--to", "200 ms", "-o", out), "--to: before --from, which is 300 ms, '200 ms'"
     yield (run, "-o", run), "exists already; a capture is never overwritten"
-    yield (run, "-o", tmp_path / "none" / "o.mcap"), "cannot be written, No such file"
+    yield (run, "-o", run / "o.mcap"), "cannot be created, File exists"
 
 
 def test_bad_input_is_named_and_leaves_no_file(run: Path, tmp_path: Path, bad_files: list[Path]) -> None:
     before = sorted(tmp_path.iterdir())
     for arguments, text in refusals(run, tmp_path):
         done = replay("cut", *arguments)
-        assert done.code == (1 if "cannot be written" in text else 2) and text in done.err, done
+        assert done.code == (1 if "cannot be created" in text else 2) and text in done.err, done
     for bad in bad_files:
         done = replay("cut", bad, "-o", tmp_path / "o.mcap")
         assert done.code == 2 and str(bad) in done.err

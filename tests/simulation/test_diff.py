@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.analysis import diff as diff_module
-from foosim.analysis.diff import diff_captures, first_difference
+from foosim.capture import diff as diff_module
+from foosim.capture.diff import diff_captures, first_difference
 from foosim.capture.foxglove import POSES
 from foosim.capture.mcap.format import Message
 from foosim.capture.rows import CLIENTS, EPOCHS, FRAME, PACKETS, TICK

@@ -13,12 +13,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from foosim.analysis import export as export_module
-from foosim.analysis.export import export_capture
-from foosim.analysis.tables import table_names, table_of
+from foosim.capture import export as export_module
+from foosim.capture.export import export_capture
 from foosim.capture.mcap.format import Message
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import PacketRow
+from foosim.capture.tables import table_names, table_of
 from foosim.common.errors import BadValue, Failed
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment

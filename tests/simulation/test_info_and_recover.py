@@ -10,8 +10,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.analysis.diff import diff_captures
 from foosim.capture import contents as capture_contents
+from foosim.capture import writer as capture_writer
+from foosim.capture.diff import diff_captures
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import BadBranch, read_branch
@@ -20,7 +21,6 @@ from foosim.deployment.loader import load_deployment
 from foosim.runtime.journal import Journal
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
-from foosim.vhub.recording import writer as capture_writer
 from tests.simulation.conftest import TABLE, damaged, messages_of, replay
 
 

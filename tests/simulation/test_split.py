@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.analysis.diff import diff_captures
+from foosim.capture.diff import diff_captures
 from foosim.capture.parts import files_from
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import read_branch
@@ -78,7 +78,7 @@ def test_a_file_that_is_missing_is_bad_input(tmp_path: Path, split: Path) -> Non
             (tmp_path / file.name).write_bytes(file.read_bytes())
     for command in ("info", "verify", "what-if", "play", "recover"):
         done = replay(command, tmp_path / "run.mcap")
-        assert done.code in (1, 2) and "run_0003.mcap: is missing, run_0004.mcap goes on behind it" in done.err, done
+        assert done.code in (1, 2) and "run_0003.mcap: is missing, run_0004.mcap follows it" in done.err, done
     (tmp_path / "run_0000.mcap").touch()
     for number in (4, 5, 6):
         (tmp_path / f"run_000{number}.mcap").unlink()

@@ -8,7 +8,7 @@ to nobody, bytes that are no message, a robot that is down for a while, a ball t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import shake_128
 from pathlib import Path
 
@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from foosim.capture import contents as capture_contents
+from foosim.capture import writer as capture_writer
 from foosim.common import limits
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
@@ -41,8 +42,7 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.vhub.core import HubCore
-from foosim.vhub.recording import writer as capture_writer
-from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.assembly.world import initial_numbers
@@ -311,10 +311,21 @@ def hub_run() -> HubRun:
 LOG_LINES = [("info", "kick-off", 0), ("warning", "late", 3), ("error", "gone", 63)]
 
 
-def write_capture(path: Path, run: HubRun) -> Path:
+BY_TIME = "capture.split_time=20 ms"
+"""Ten ticks, as often as a frame is captured: files begin at ticks 10, 20, ..., 60."""
+METADATA = {"run": "run-1", "fingerprint": "00"}
+
+
+def with_sets(run: HubRun, *sets: str) -> HubRun:
+    """The run as one of a deployment with other settings of its capture."""
+    text = apply_sets(run.text, NAME, sets)
+    return replace(run, text=text, deployment=load_deployment(text, NAME))
+
+
+def write_capture(path: Path, run: HubRun, *sets: str) -> Recorder:
     """Write a run's capture, with three lines of log."""
-    metadata = {"run": "run-1", "fingerprint": "00"}
-    writer = CaptureWriter(path, run.deployment, NAME, run.text, metadata)
+    run = with_sets(run, *sets)
+    writer = Recorder(path, run.deployment, NAME, run.text, METADATA)
     epochs = {epoch.tick: epoch for epoch in run.epochs}
     for closing in run.closings:
         if closing.frame.tick in epochs:
@@ -323,13 +334,19 @@ def write_capture(path: Path, run: HubRun) -> Path:
     for line in LOG_LINES:
         writer.log(*line)
     writer.finish({"reason": "enough"})
-    return path
+    return writer
 
 
 @pytest.fixture(scope="session")
 def path(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run's capture."""
-    return write_capture(tmp_path_factory.mktemp("captures") / "run.mcap", hub_run)
+    return write_capture(tmp_path_factory.mktemp("captures") / "run.mcap", hub_run).path
+
+
+@pytest.fixture(scope="session")
+def parts(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run in seven files; not to be changed."""
+    return write_capture(tmp_path_factory.mktemp("split") / "run.mcap", hub_run, BY_TIME).path
 
 
 @pytest.fixture(scope="session")
@@ -338,4 +355,4 @@ def chunked(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(capture_writer, "BATCH_ROWS", 40)
         patch.setattr(capture_contents, "CHUNK_BYTES", 1)
-        return write_capture(tmp_path_factory.mktemp("captures") / "chunked.mcap", hub_run).read_bytes()
+        return write_capture(tmp_path_factory.mktemp("captures") / "chunked.mcap", hub_run).path.read_bytes()

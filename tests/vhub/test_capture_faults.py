@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import zstandard
 
-from foosim.capture import contents as capture_contents
+from foosim.capture import file as capture_file
+from foosim.capture import writer as capture_writer
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import CHUNK_BYTES_MAX
@@ -22,17 +23,15 @@ from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.reader import open_capture
 from foosim.common import limits
 from foosim.common.errors import Refused
-from foosim.vhub.recording import file as capture_file
-from foosim.vhub.recording import writer as capture_writer
 from foosim.vhub.recording.disk_watch import DiskProgress
-from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.recording.recorder import Recorder
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
 
 
-def new_writer(path: Path, run: HubRun, say: Callable[[str, str], None] | None = None) -> CaptureWriter:
-    return CaptureWriter(path, run.deployment, "table.yaml", run.text, {}, say)
+def new_writer(path: Path, run: HubRun, say: Callable[[str, str], None] | None = None) -> Recorder:
+    return Recorder(path, run.deployment, "table.yaml", run.text, {}, say)
 
 
 def test_an_unfinished_file_gives_what_is_whole(chunked: bytes, hub_run: HubRun, tmp_path: Path) -> None:
@@ -186,7 +185,7 @@ def test_a_hostile_record_costs_no_more_than_a_chunk(record: bytes, text: str, t
 # --- a writer that lags, a disk that fails ----------------------------------------------------------------------------
 
 
-class Gated(CaptureWriter):
+class Gated(Recorder):
     """A writer whose thread waits for a gate before each item."""
 
     gate = threading.Event()
@@ -254,7 +253,7 @@ def test_the_disk_is_asked_for_its_progress_while_a_sync_lasts(
         goes_on.wait()
         sync(file)
 
-    writer = CaptureWriter(tmp_path / "slow.mcap", hub_run.deployment, "table.yaml", hub_run.text, {})
+    writer = Recorder(tmp_path / "slow.mcap", hub_run.deployment, "table.yaml", hub_run.text, {})
     device = writer.path.stat().st_dev
     account = tmp_path / f"{os.major(device)}:{os.minor(device)}" / "stat"
     account.parent.mkdir()
@@ -274,36 +273,13 @@ def test_the_disk_is_asked_for_its_progress_while_a_sync_lasts(
     assert not writer.is_syncing
 
 
-class Disk:
-    """A disk that is full after a while."""
-
-    def __init__(self, room: int, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.room = room
-        self._write = capture_contents.write_all
-        monkeypatch.setattr(capture_file, "write_all", self.write)
-
-    def write(self, file: int, content: bytes) -> None:
-        self.room -= len(content)
-        if self.room < 0:
-            raise OSError(28, os.strerror(28))
-        self._write(file, content)
-
-
-def test_a_disk_that_is_full_at_the_start_is_told_at_once(
-    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    Disk(100, monkeypatch)
-    with pytest.raises(CaptureError, match="cannot be written, No space left on device"):
-        new_writer(tmp_path / "full.mcap", hub_run)
-
-
 def test_a_process_that_ends_without_finishing_is_not_held_up(hub_run: HubRun, tmp_path: Path) -> None:
     program = """if True:
         import pathlib, sys
         from foosim.deployment.loader import load_deployment
-        from foosim.vhub.recording.writer import CaptureWriter
+        from foosim.vhub.recording.recorder import Recorder
         text = sys.stdin.read()
-        CaptureWriter(pathlib.Path(sys.argv[1]), load_deployment(text, "t"), "t", text, {})
+        Recorder(pathlib.Path(sys.argv[1]), load_deployment(text, "t"), "t", text, {})
     """
     path = tmp_path / "left.mcap"
     subprocess.run([sys.executable, "-c", program, str(path)], check=True, input=hub_run.text.encode())

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import random
 import re
-from collections.abc import Sequence
+import shutil
+from collections.abc import Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,17 +16,24 @@ from mcap.reader import make_reader
 from mcap.records import DataEnd
 from mcap.stream_reader import StreamReader
 
+from foosim.capture import index as capture_index
+from foosim.capture.index import UNSYNCED_BYTES
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.mcap.format import MAGIC, McapFile, Message
-from foosim.capture.mcap.scan import UNSYNCED_BYTES
+from foosim.capture.mcap.format import MAGIC, Message
+from foosim.capture.parts import Joined, files_from, first_there
 from foosim.capture.reader import open_capture
-from foosim.common.errors import Refused
+from foosim.common.errors import Failed, Refused
+from foosim.protocol.codec import decode_any
 from foosim.runtime.disk import Room
 from foosim.runtime.journal import Journal, JournalError
-from foosim.vhub.recording import recovery, unfinished
+from foosim.vhub.recording import recovery
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import UNCLEAN, Recovered, recover_capture, recovered_path
-from foosim.vhub.recording.writer import CaptureWriter
+from foosim.vhub.state.capture_queue import RecordClosing
+from foosim.vhub.state.records import Closing, HubRecord, TickRecord
+from foosim.vhub.state.resume import first_tick_of, recall
+from tests.vhub.conftest import BY_TIME, EPOCH_AT, METADATA, NAME, with_sets
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -58,16 +68,20 @@ def recovered(path: Path, journals: Path | None = None) -> Recovered:
 
 
 def rows(path: Path, last: int = LAST) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows up to a tick of all topics but the log, without what only a clock knew, and views as they are."""
+    """Return the rows up to a tick of all topics but the log, without what only a clock knew, and views as they are.
+
+    Without the frame that each capture ends with.
+    """
     kept: dict[str, list[dict[str, Any]]] = {}
-    with path.open("rb") as stream:
-        for content in McapFile(stream, path.stat().st_size, str(path)).contents():
-            if isinstance(content, Message) and content.topic != "/log" and content.log_ns <= last * 2_000_000:
-                row: dict[str, Any] = {"data": content.data}
-                if content.data[:1] == b"{":
-                    row = {k: v for k, v in msgspec.json.decode(content.data).items() if not k.startswith("wall_")}
-                row["place"] = content.log_ns, content.publish_ns, content.sequence
-                kept.setdefault(content.topic, []).append(row)
+    for content in Joined(path).contents():
+        if isinstance(content, Message) and content.topic != "/log" and content.log_ns <= last * 2_000_000:
+            row: dict[str, Any] = {"data": content.data}
+            if content.data[:1] == b"{":
+                row = {k: v for k, v in msgspec.json.decode(content.data).items() if not k.startswith("wall_")}
+            row["place"] = content.log_ns, content.publish_ns, content.sequence
+            kept.setdefault(content.topic, []).append(row)
+    if "/frame" in kept:
+        kept["/frame"] = [row for row in kept["/frame"] if row["tick"] % 10 == 0]
     return kept
 
 
@@ -95,60 +109,164 @@ def first_chunk(content: bytes) -> int:
     return content.index(b"versions.json") + 2000
 
 
-def cuts(content: bytes) -> Sequence[int]:
-    return [*range(first_chunk(content), len(content) - 1, 12_973), len(content) - 1]
+def journal_until(run: HubRun, tick: int) -> list[bytes]:
+    """The run's journal as a machine leaves it that is lost after the record of a tick."""
+    for at, raw in enumerate(run.journal):
+        record = decode_any(HubRecord, raw)
+        if isinstance(record, TickRecord) and record.tick == tick:
+            return run.journal[: at + 1]
+    raise AssertionError(f"no record {tick}")
 
 
-def test_cut_anywhere_the_journal_gives_what_is_missing(
-    chunked: bytes, path: Path, journals: Path, hub_run: HubRun, tmp_path: Path
+def resume(path: Path, run: HubRun, records: Sequence[bytes]) -> None:
+    """Continue an unfinished capture to the run's end as a vHub does whose journal has these records."""
+    had = open_capture(path) if first_there(path).exists() else None
+    described = run.deployment, NAME, run.text, METADATA
+    writer = Recorder(path, *described, None, first_tick_of(run.deployment, records))
+    if had is not None:
+        assert writer.captured.tick <= max(had.ticks.tolist(), default=-1)  # a chunk without its indexes comes again
+    past = recall(run.deployment, "run-1", records, writer.captured, 0)
+    assert past is not None
+    if past.known is not None:
+        writer.keep(past.known)
+    for item in past.kept:
+        writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
+    known = 0 if past.epoch is None else past.epoch.epoch
+    for epoch in run.epochs:
+        if epoch.epoch > known:
+            writer.keep(epoch)
+    for closing in run.closings:
+        if closing.frame.tick > past.state.closed:
+            writer.keep(closing)
+    writer.finish({"reason": "enough"})
+    found, capture = writer.statistics(), open_capture(path)
+    assert found.offered == found.written >= len(capture.ticks) + len(capture.packets), "of the whole capture"
+    assert found.bytes == sum(file.stat().st_size for file in files_from(path))
+
+
+def killed(content: bytes, parts: Path, folder: Path) -> Iterator[Path]:
+    """What a writer leaves that is killed: within one file, or within one of several, or between two of them."""
+    rng = random.Random(67)
+    chunk = make_reader(BytesIO(content)).get_summary().chunk_indexes[3]  # type: ignore[union-attr]
+    indexes = chunk.chunk_start_offset + chunk.chunk_length
+    sizes = [rng.randrange(first_chunk(content), len(content)) for _ in range(8)]
+    sizes += [rng.randrange(indexes, indexes + chunk.message_index_length) for _ in range(3)]
+    sizes += [indexes, first_chunk(content), *(len(content) - rng.randrange(1, 4000) for _ in range(4))]
+    for size in sizes:
+        folder.mkdir()
+        yield cut(folder, content[:size])
+        shutil.rmtree(folder)
+    files = files_from(parts)
+    for count in range(1, len(files)):
+        whole = files[count].stat().st_size
+        for size in (-1, rng.randrange(9, whole), whole - rng.randrange(1, 9_000)):
+            folder.mkdir()
+            for file in files[:count]:
+                shutil.copy(file, folder)
+            if size >= 0:
+                (folder / files[count].name).write_bytes(files[count].read_bytes()[:size])
+            yield folder / parts.name
+            shutil.rmtree(folder)
+
+
+def assert_whole(path: Path, whole: Path, last: int = LAST) -> None:
+    """A capture has the rows of the one of the run that was not killed, each once, and other tools read its files."""
+    made, expected = rows(path, last), rows(whole, last)
+    for topic in {*made, *expected}:  # the tests' capture has epochs in another place among the rows of their tick
+        if topic == "/epochs":
+            assert [row["epoch"] for row in made[topic]] == [row["epoch"] for row in expected[topic]]
+        else:
+            assert made[topic] == expected[topic], topic
+    capture, other = open_capture(path), open_capture(whole)
+    assert capture.finished and capture.recoveries == other.recoveries and len(capture.packets) == len(other.packets)
+    assert capture.ticks.tolist() == list(range(len(capture.ticks)))
+    assert read_by_others(files_from(path)[-1]) > 0
+
+
+@pytest.mark.parametrize("closed", [0, 9, EPOCH_AT, LAST])
+def test_a_restarted_vhub_writes_what_is_missing_wherever_it_was_killed(
+    chunked: bytes,
+    parts: Path,
+    path: Path,
+    hub_run: HubRun,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    closed: int,
 ) -> None:
-    whole = rows(path)
-    starts: set[int] = set()
-    for size in cuts(chunked):
-        found = recovered(cut(tmp_path, chunked[:size]), journals)
-        made = rows(found.path)
-        made["/epochs"] = whole["/epochs"]  # the journal of these tests has none
-        last = [row for row in made["/frame"] if row not in whole["/frame"]]
-        assert [row["tick"] for row in last] in ([], [LAST]), size  # the last one stands in every capture
-        made["/frame"] = [row for row in made["/frame"] if row not in last]
-        assert made == whole, size
-        capture = open_capture(found.path)
-        assert capture.recoveries == open_capture(path).recoveries, "how long they took was told by a commit"
-        assert capture.finished and capture.about.end["reason"] == UNCLEAN and found.problem == ""
-        assert len(capture.packets) == hub_run.core.statistics().offered
-        assert read_by_others(found.path) == sum(capture_info(found.path).topics.values())
-        assert found.tick == int(capture.ticks[-1]) >= LAST
-        starts.add(found.tick + 1 - found.added_ticks)
-        assert recover_capture(found.path, journals) is None
-    assert len(starts) > 3
+    """Its journal ends at `closed`, with the machine perhaps, and files may be further. No row is written twice.
+
+    Without a split the ordered end makes one file of the capture; else the files that were left stay, and the next
+    one can be read by itself.
+    """
+    records = journal_until(hub_run, closed)
+    for number, left in enumerate(killed(chunked, parts, tmp_path / "left")):
+        before = {file: file.read_bytes() for file in files_from(left)}
+        is_split = number % 2 == 1
+        monkeypatch.setattr(capture_index, "UNSYNCED_BYTES", (20_000, UNSYNCED_BYTES)[number // 2 % 2])
+        resume(left, with_sets(hub_run, BY_TIME) if is_split else hub_run, records)
+        assert_whole(left, path, 64)
+        assert open_capture(left).about.end == {"reason": "enough"}
+        assert capture_info(left).chain == capture_info(path).chain
+        after = files_from(left)
+        if not is_split:
+            assert [*left.parent.iterdir()] == [left], "nothing else stays"
+            assert open_capture(left).about.metadata == open_capture(path).about.metadata
+            continue
+        for file, content in before.items():
+            assert file.read_bytes() == content or open_capture(file).finished, "what was left stays as it is"
+        for file in after[1:]:
+            alone = open_capture(file)
+            assert alone.frames.ticks[0] == alone.ticks[0] and capture_info(file).chain == capture_info(path).chain
 
 
-def test_cut_anywhere_without_a_journal_every_whole_chunk_stays(chunked: bytes, tmp_path: Path) -> None:
-    for size in cuts(chunked)[::2]:
-        path = cut(tmp_path, chunked[:size])
-        before = rows(path, 64)
-        found = recovered(path)
-        after = rows(found.path, 64)
-        assert open_capture(found.path).finished and read_by_others(found.path) > 0
-        assert found.problem == "there is no journal of it" and found.added_ticks == 0
-        assert after == before and found.tick == len(before.get("/tick", ())) - 1
+def test_wherever_a_writer_was_killed_the_journal_gives_what_is_missing(
+    chunked: bytes, parts: Path, path: Path, hub_run: HubRun, tmp_path: Path
+) -> None:
+    with Journal(tmp_path / "whole", "vhub") as journal:
+        for record in hub_run.journal:
+            journal.append(record)
+    for left in killed(chunked, parts, tmp_path / "left"):
+        before = {file: file.read_bytes() for file in files_from(left)}
+        kept = rows(left, 64)
+        alone = recover_capture(left, None, left.with_name("alone.mcap"))
+        assert alone is not None and alone.problem == "there is no journal of it" and alone.added_ticks == 0
+        assert rows(alone.path, 64) == kept
+        assert read_by_others(alone.path) == sum(capture_info(alone.path).topics.values())
+        found = recover_capture(left, tmp_path / "whole", left.with_name("made.mcap"))
+        assert found is not None and found.is_whole and found.tick >= LAST
+        assert_whole(found.path, path)
+        assert open_capture(found.path).about.end["reason"] == UNCLEAN
+        assert recover_capture(found.path, tmp_path / "whole") is None
+        assert {file: file.read_bytes() for file in before} == before and not list(left.parent.glob(".*"))
 
 
-def test_a_chunk_whose_indexes_were_cut_stays(chunked: bytes, tmp_path: Path) -> None:
-    """Every byte between a chunk and the end of its indexes."""
-    with (tmp_path / "whole").open("wb+") as stream:
-        stream.write(chunked)
-        stream.seek(0)
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    chunk = summary.chunk_indexes[3]
-    end = chunk.chunk_start_offset + chunk.chunk_length
-    for size in range(end, end + chunk.message_index_length + 1, 61):
-        path = cut(tmp_path, chunked[:size])
-        before = rows(path)
-        found = recovered(path)
-        assert rows(found.path) == before
-        assert read_by_others(found.path) == sum(map(len, before.values())) + 1  # the line about the recovery
+def test_a_run_that_ends_where_its_journal_does_loses_nothing(chunked: bytes, hub_run: HubRun, tmp_path: Path) -> None:
+    """The journal ends at tick 20: the run ends there, and what the capture has of later ticks stays, row for row."""
+    file = cut(tmp_path, chunked[: len(chunked) * 2 // 3])
+    before, records = rows(file), journal_until(hub_run, 20)
+    described = hub_run.deployment, NAME, hub_run.text, METADATA
+    writer = Recorder(file, *described, None, first_tick_of(hub_run.deployment, records))
+    past = recall(hub_run.deployment, "run-1", records, writer.captured, 0)
+    assert past is not None and not past.kept and past.state.closed == 20 < writer.captured.tick
+    assert past.committed is not None
+    end = Closing(past.committed[2], past.committed[2].digest, [], [], fates=past.state.in_flight())
+    for _ in range(2):
+        writer.keep(end)
+    writer.finish({"reason": "lost vhub"})
+    assert rows(file) == before and open_capture(file).finished
+    read_by_others(file)
+
+
+def test_a_finished_capture_and_one_of_another_run_are_not_continued(
+    path: Path, chunked: bytes, hub_run: HubRun, tmp_path: Path
+) -> None:
+    described = hub_run.deployment, NAME, hub_run.text
+    with pytest.raises(CaptureError, match="is finished; a capture is never overwritten"):
+        Recorder(path, *described, {"run": "run-1"}, None, 0)
+    left = cut(tmp_path, chunked[: len(chunked) // 2])
+    with pytest.raises(CaptureError, match="is that of run run-1, not of run run-2"):
+        Recorder(left, *described, {"run": "run-2"}, None, 0)
+    assert left.read_bytes() == chunked[: len(chunked) // 2] and [*tmp_path.iterdir()] == [left]
 
 
 def test_bytes_that_were_never_written_are_left_out(
@@ -158,8 +276,8 @@ def test_bytes_that_were_never_written_are_left_out(
     size = len(chunked) * 2 // 3
     path = cut(tmp_path, chunked[:size] + bytes(20_000))
     assert recovered(path).problem.endswith("there is no journal of it")
-    with pytest.raises(CaptureError, match=r"damaged; \d+ bytes from there on would be lost, no journal has tick \d+"):
-        CaptureWriter(path, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-1"}, None, LAST)
+    with pytest.raises(CaptureError, match=r"cut or damaged; \d+ bytes .* would be lost, no journal has tick \d+"):
+        Recorder(path, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-1"}, None, LAST)
     found = recovered(path, journals)
     assert found.tick == LAST and found.is_whole and open_capture(found.path).finished
 
@@ -176,15 +294,6 @@ def test_damage_before_the_end_loses_nothing_that_no_journal_has(
     found = recovered(path, journals)
     assert found.is_whole and found.added_ticks > 20
     assert open_capture(found.path).ticks.tolist() == list(range(LAST + 1))
-
-
-def test_what_was_in_flight_is_written_once(path: Path, journals: Path, hub_run: HubRun, tmp_path: Path) -> None:
-    """The end was written, the summary was not."""
-    content = path.read_bytes()
-    for size in range(len(content) - 4000, len(content) - 1, 499):
-        found = recovered(cut(tmp_path, content[:size]), journals)
-        assert found.tick == 64 and found.added_ticks == 0
-        assert len(open_capture(found.path).packets) == hub_run.core.statistics().offered
 
 
 def test_a_journal_that_does_not_fit_is_told_and_changes_nothing(
@@ -218,7 +327,7 @@ def test_a_file_that_is_there_is_not_overwritten(chunked: bytes, tmp_path: Path)
     before = found.path.read_bytes()
     with pytest.raises(CaptureError, match=r"cut\.recovered\.mcap: exists already"):
         recover_capture(path)
-    with pytest.raises(CaptureError, match=r"\.new\.mcap\.part: cannot be created"):
+    with pytest.raises(Failed, match=r"\.new\.mcap\.part: cannot be created"):
         recover_capture(path, out=path / "new.mcap")
     assert found.path.read_bytes() == before
 
@@ -249,33 +358,3 @@ def test_no_capture_is_refused(tmp_path: Path) -> None:
         with pytest.raises(Refused, match=r"cut\.mcap: "):
             recover_capture(cut(tmp_path, content))
         assert (tmp_path / "cut.mcap").read_bytes() == content
-
-
-@pytest.mark.parametrize("unsynced", [20_000, UNSYNCED_BYTES])
-def test_a_writer_goes_on_with_what_it_left(
-    chunked: bytes, path: Path, hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unsynced: int
-) -> None:
-    """As a vHub does that was killed and started again: it feeds all of its journal, and the run goes on."""
-    monkeypatch.setattr(unfinished, "UNSYNCED_BYTES", unsynced)
-    whole = rows(path, 64)
-    for size in (10, first_chunk(chunked), len(chunked) // 2, len(chunked) - 3000):
-        going = cut(tmp_path, chunked[:size])
-        metadata = {"run": "run-1", "fingerprint": "00"}
-        writer = CaptureWriter(going, hub_run.deployment, "table.yaml", hub_run.text, metadata, None, 0)
-        for epoch in hub_run.epochs:
-            writer.keep(epoch)
-        for closing in hub_run.closings:
-            writer.keep(closing)
-        writer.finish({"reason": "enough"})
-        made = rows(going, 64)
-        assert {topic: sorted(map(str, found)) for topic, found in made.items()} == {
-            topic: sorted(map(str, found)) for topic, found in whole.items()
-        }
-        assert open_capture(going).about.metadata == open_capture(path).about.metadata
-        read_by_others(going)
-    with pytest.raises(CaptureError, match="is finished; a capture is never overwritten"):
-        CaptureWriter(going, hub_run.deployment, "table.yaml", hub_run.text, {}, None, 0)
-    for_another_run = cut(tmp_path, chunked[: len(chunked) // 2])
-    with pytest.raises(CaptureError, match="is that of run run-1, not of run run-2"):
-        CaptureWriter(for_another_run, hub_run.deployment, "table.yaml", hub_run.text, {"run": "run-2"}, None, 0)
-    assert for_another_run.read_bytes() == chunked[: len(chunked) // 2]

@@ -13,16 +13,17 @@ import pytest
 from mcap.reader import make_reader
 
 from foosim.capture import contents as capture_contents
+from foosim.capture import file as capture_file
+from foosim.capture import writer as capture_writer
+from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import open_capture
 from foosim.common import limits
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.runtime import disk
 from foosim.runtime.disk import Level, Room
-from foosim.vhub.recording import file as capture_file
-from foosim.vhub.recording import writer as capture_writer
 from foosim.vhub.recording.disk_watch import RoomWatch
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import recover_capture
-from foosim.vhub.recording.writer import CaptureWriter
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -58,14 +59,14 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 60)
 
 
-def new_writer(path: Path, run: HubRun, *sets: str) -> CaptureWriter:
+def new_writer(path: Path, run: HubRun, *sets: str) -> Recorder:
     if not sets:
-        return CaptureWriter(path, run.deployment, "table.yaml", run.text, {"run": "run-1"})
+        return Recorder(path, run.deployment, "table.yaml", run.text, {"run": "run-1"})
     text = apply_sets(run.text, "table.yaml", sets)
-    return CaptureWriter(path, load_deployment(text, "table.yaml"), "table.yaml", text, {"run": "run-1"})
+    return Recorder(path, load_deployment(text, "table.yaml"), "table.yaml", text, {"run": "run-1"})
 
 
-def feed(writer: CaptureWriter, run: HubRun) -> list[Level]:
+def feed(writer: Recorder, run: HubRun) -> list[Level]:
     """Hand over the whole run; return the levels that the writer came to on the way."""
     assert writer.state.level is Level.FINE
     for closing in run.closings:
@@ -74,7 +75,7 @@ def feed(writer: CaptureWriter, run: HubRun) -> list[Level]:
     return [state.level for state in writer.states]
 
 
-def assert_accounted(writer: CaptureWriter, run: HubRun) -> None:
+def assert_accounted(writer: Recorder, run: HubRun) -> None:
     """Every tick and packet is in the file, or counted as refused."""
     found = writer.statistics()
     offered = sum(1 + len(closing.fates) for closing in run.closings)
@@ -121,6 +122,14 @@ def test_a_run_that_goes_on_without_its_capture_has_a_valid_one_up_to_there(
     assert capture.finished and 0 < len(capture.ticks) < 65
     assert capture.about.end["reason"] == f"not captured further: {writer.state.text}"
     assert capture.about.end["last_tick"] == str(capture.ticks[-1])
+
+
+def test_a_disk_that_is_full_at_the_start_is_reported_at_once(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Disk(100, monkeypatch)
+    with pytest.raises(CaptureError, match="cannot be written, No space left on device"):
+        new_writer(tmp_path / "full.mcap", hub_run)
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])

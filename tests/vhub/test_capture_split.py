@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,78 +10,27 @@ import msgspec
 import pytest
 
 from foosim.capture import contents as capture_contents
+from foosim.capture import writer as capture_writer
 from foosim.capture.cut import cut_capture
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import McapFile, Message
-from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import Joined, files_from
 from foosim.capture.reader import open_capture, read_about
-from foosim.capture.rows import PROFILE
-from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.schema import Deployment
 from foosim.runtime.disk import Level
 from foosim.runtime.journal import Journal
-from foosim.vhub.recording import unfinished
-from foosim.vhub.recording import writer as capture_writer
-from foosim.vhub.recording.file import CaptureFile, Described
 from foosim.vhub.recording.recovery import recover_capture
-from foosim.vhub.recording.split import Split
-from foosim.vhub.recording.writer import CaptureWriter
-from foosim.vhub.state.capture_queue import RecordClosing
-from foosim.vhub.state.records import Closing
-from foosim.vhub.state.resume import first_tick_of, recall
-from tests.vhub.conftest import LOG_LINES, NAME
-from tests.vhub.test_capture_branch import journal_until
-from tests.vhub.test_capture_recovery import LAST, read_by_others, rows
+from tests.vhub.conftest import BY_TIME, LOG_LINES
+from tests.vhub.conftest import write_capture as write
+from tests.vhub.test_capture_recovery import read_by_others
 from tests.vhub.test_capture_room import Disk
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
 
-BY_TIME = "capture.split_time=20 ms"
-"""Ten ticks, as often as a frame is captured: files begin at ticks 10, 20, ..., 60."""
-METADATA = {"run": "run-1", "fingerprint": "00"}
-
-
-def split_by(run: HubRun, *sets: str) -> tuple[str, Deployment]:
-    text = apply_sets(run.text, NAME, sets)
-    return text, load_deployment(text, NAME)
-
-
-def write(path: Path, run: HubRun, *sets: str, until: int | None = None) -> CaptureWriter:
-    text, deployment = split_by(run, *sets)
-    writer = CaptureWriter(path, deployment, NAME, text, METADATA)
-    epochs = {epoch.tick: epoch for epoch in run.epochs}
-    for closing in run.closings[:until]:
-        if closing.frame.tick in epochs:
-            writer.keep(epochs[closing.frame.tick])
-        writer.keep(closing)
-    for line in LOG_LINES:
-        writer.log(*line)
-    writer.finish({"reason": "enough"})
-    return writer
-
 
 def messages(path: Path) -> list[Message]:
     return [content for content in Joined(path).contents() if isinstance(content, Message)]
-
-
-def joined_rows(path: Path, last: int = LAST) -> dict[str, list[object]]:
-    """The rows of all files up to a tick, without the log and the frame that a file ends with between two others."""
-    kept: dict[str, list[object]] = {}
-    for message in messages(path):
-        if message.topic != "/log" and message.log_ns <= last * 2_000_000:
-            kept.setdefault(message.topic, []).append(message)
-    return kept
-
-
-@pytest.fixture(scope="module")
-def parts(hub_run: HubRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run in seven files; not to be changed."""
-    path = tmp_path_factory.mktemp("split") / "run.mcap"
-    write(path, hub_run, BY_TIME)
-    return path
 
 
 @pytest.fixture
@@ -183,11 +131,11 @@ def test_a_cut_is_one_file(parts: Path, path: Path, tmp_path: Path) -> None:
 def test_a_file_that_is_missing_is_named(copied: Path) -> None:
     (copied.parent / "run_0003.mcap").unlink()
     for named in ("run.mcap", "run_0001.mcap"):
-        with pytest.raises(CaptureError, match=r"run_0003\.mcap: is missing, run_0004\.mcap goes on behind it"):
+        with pytest.raises(CaptureError, match=r"run_0003\.mcap: is missing, run_0004\.mcap follows it"):
             open_capture(copied.parent / named)
     assert open_capture(copied.parent / "run_0004.mcap").ticks[0] == 40
     copied.unlink()
-    with pytest.raises(CaptureError, match=r"run\.mcap: is missing, run_0001\.mcap goes on behind it"):
+    with pytest.raises(CaptureError, match=r"run\.mcap: is missing, run_0001\.mcap follows it"):
         open_capture(copied)
 
 
@@ -203,150 +151,20 @@ def test_a_file_of_another_run_or_without_its_end_is_refused(copied: Path, hub_r
     second = copied.parent / "run_0002.mcap"
     content = second.read_bytes()
     second.write_bytes(content[: len(content) // 2])
-    with pytest.raises(CaptureError, match=r"run_0002\.mcap: it has no end, and run_0003\.mcap goes on behind it"):
+    with pytest.raises(CaptureError, match=r"run_0002\.mcap: it has no end, and run_0003\.mcap follows it"):
         open_capture(copied)
     second.write_bytes((copied.parent / "run_0004.mcap").read_bytes())
-    with pytest.raises(CaptureError, match=r"run_0002\.mcap: is not what run_0001\.mcap goes on in"):
+    with pytest.raises(CaptureError, match=r"run_0002\.mcap: does not follow run_0001\.mcap"):
         open_capture(copied)
     with pytest.raises(CaptureError, match=r"run_0001\.mcap: exists already"):
         copied.unlink()
         write(copied, hub_run, BY_TIME)
 
 
-@pytest.mark.parametrize("entries", [{"part": "none"}, {"part": "0", "cut_tick": "-1"}, {"part": "0", "cut_tick": ""}])
-def test_a_number_that_is_none_is_refused(tmp_path: Path, hub_run: HubRun, entries: dict[str, str]) -> None:
-    path = tmp_path / "run.mcap"
-    written: list[bytes] = []
-    mcap = McapWriter(written.append, PROFILE)
-    mcap.add_metadata("foosim", entries)
-    mcap.finish()
-    path.write_bytes(b"".join(written))
-    split = Split(path, split_by(hub_run, BY_TIME)[1].capture, 2_000_000)
-    with pytest.raises(CaptureError, match=r"run\.mcap: its (part|cut_tick) is no number, '"):
-        split.take_over(0, 0, is_empty=True)
-
-
 def test_others_of_like_names_are_left_alone(path: Path, tmp_path: Path) -> None:
     for name in ("run.mcap", "run_0001.mcap", "run_12.mcap"):
         shutil.copy(path, tmp_path / name)
     assert files_from(tmp_path / "run.mcap") == [tmp_path / "run.mcap"]
-
-
-# --- unclean ends ----------------------------------------------------------------------------------------------------
-
-
-def left_behind(parts: Path, folder: Path, count: int, size: int) -> Path:
-    """What a writer leaves that is killed within the file number `count`, or just before it (size -1)."""
-    folder.mkdir()
-    files = files_from(parts)
-    for file in files[:count]:
-        shutil.copy(file, folder)
-    if size >= 0:
-        (folder / files[count].name).write_bytes(files[count].read_bytes()[:size])
-    return folder / parts.name
-
-
-def test_the_first_file_of_a_branch_that_is_gone_on_with_ends_when_it_would_have(
-    hub_run: HubRun, tmp_path: Path
-) -> None:
-    text, deployment = split_by(hub_run, BY_TIME)
-    described = Described(deployment, NAME, text, {**METADATA, "from": "other", "from_tick": "35"})
-    file = CaptureFile(tmp_path / "run.mcap", described)
-    for closing in hub_run.closings[35:38]:
-        file.write(closing)
-    file.end_chunk()
-    file.close()
-    file = CaptureFile(tmp_path / "run.mcap", described, 35)
-    assert [closing.frame.tick for closing in hub_run.closings[38:55] if file.begins_next(closing)] == [50]
-    file.close()
-
-
-def places(parts: Path) -> Iterator[tuple[int, int]]:
-    for count, file in list(enumerate(files_from(parts)))[1:]:
-        size = file.stat().st_size
-        for place in ((-1, size // 2), (3, size - 9_000), (9_000, size - 1))[count % 3]:
-            yield count, place
-
-
-def test_killed_anywhere_the_journal_gives_what_is_missing(
-    parts: Path, path: Path, hub_run: HubRun, tmp_path: Path
-) -> None:
-    with Journal(tmp_path / "journals", "vhub") as journal:
-        for record in hub_run.journal:
-            journal.append(record)
-    whole = rows(path)
-    for number, (count, size) in enumerate(places(parts)):
-        left = left_behind(parts, tmp_path / str(number), count, size)
-        found = recover_capture(left, tmp_path / "journals")
-        assert found is not None and found.is_whole and found.tick >= LAST, (count, size)
-        capture = open_capture(found.path)
-        assert capture.finished and capture.ticks.tolist() == list(range(found.tick + 1))
-        assert files_from(found.path) == [found.path] and not open_capture(left).finished
-        made = rows(found.path)
-        assert {topic: len(made[topic]) for topic in ("/tick", "/packets", "/clients", "/epochs", "/layout")} == {
-            topic: len(whole[topic]) for topic in ("/tick", "/packets", "/clients", "/epochs", "/layout")
-        }, (count, size)
-        assert made["/packets"] == whole["/packets"]
-        shutil.rmtree(left.parent)
-
-
-def rows_of_all(path: Path) -> dict[str, list[dict[str, object]]]:
-    """The rows of all files, each as it stands in the file but for what only a clock knew."""
-    out = path.parent / "joined.mcap"
-    cut_capture(path, out)
-    found = rows(out)
-    out.unlink()
-    return found
-
-
-@pytest.mark.parametrize(
-    ("closed", "lefts", "unsynced"),
-    [
-        (9, [(1, -1), (2, 9_000)], 1000),
-        (10, [(4, 30_000)], 1000),
-        (33, [(4, 30_000)], 1 << 23),
-        (LAST, [(6, 60_000)], 1000),
-    ],
-)
-def test_a_vhub_goes_on_with_what_it_left_wherever_its_journal_ends(
-    parts: Path,
-    path: Path,
-    hub_run: HubRun,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    closed: int,
-    lefts: list[tuple[int, int]],
-    unsynced: int,
-) -> None:
-    """The machine was lost: files may be further than the journal, whole ones too. Nothing is written twice."""
-    monkeypatch.setattr(unfinished, "UNSYNCED_BYTES", unsynced)
-    text, deployment = split_by(hub_run, BY_TIME)
-    records = journal_until(hub_run, closed)
-    for number, (count, size) in enumerate(lefts):
-        left = left_behind(parts, tmp_path / str(number), count, size)
-        had = int(open_capture(left).ticks[-1])
-        writer = CaptureWriter(left, deployment, NAME, text, METADATA, None, first_tick_of(records))
-        assert writer.begun_with.tick == had
-        past = recall(deployment, "run-1", records, writer.begun_with, 0)
-        assert past is not None
-        if past.known is not None:
-            writer.keep(Closing(past.known, past.known.digest, [], []))
-        for item in past.kept:
-            writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
-        for epoch in hub_run.epochs:
-            if past.epoch is None or epoch.epoch > past.epoch.epoch:
-                writer.keep(epoch)
-        for closing in hub_run.closings:
-            if closing.frame.tick > past.state.closed:
-                writer.keep(closing)
-        writer.finish({"reason": "enough"})
-        made, whole = rows_of_all(left), rows(path)
-        assert names(left) == NAMES and open_capture(left).finished
-        assert [row["tick"] for row in made["/tick"]] == list(range(LAST + 1))
-        for topic in ("/tick", "/packets", "/clients", "/layout", "/scene", "/tf", "/frame"):
-            assert made[topic] == whole[topic], (topic, count, size)
-        assert len(made["/epochs"]) == len(whole["/epochs"])
-        assert capture_info(left).chain == capture_info(path).chain
 
 
 # --- disks that refuse -----------------------------------------------------------------------------------------------
@@ -403,7 +221,7 @@ def test_only_the_last_is_kept(hub_run: HubRun, path: Path, tmp_path: Path) -> N
     assert info.chain == capture_info(path).chain
     assert messages(run)[-50:] == messages(path)[-50:]
     (tmp_path / "run_0004.mcap").unlink()
-    with pytest.raises(CaptureError, match=r"run_0004\.mcap: is missing, run_0005\.mcap goes on behind it"):
+    with pytest.raises(CaptureError, match=r"run_0004\.mcap: is missing, run_0005\.mcap follows it"):
         open_capture(run)
 
 
@@ -426,11 +244,7 @@ def test_what_was_let_go_does_not_count(hub_run: HubRun, tmp_path: Path) -> None
     """All files together are larger than the capture may be; those that are there never are."""
     sizes = [file.stat().st_size for file in files_from(write(tmp_path / "a" / "run.mcap", hub_run, BY_TIME).path)]
     quota = f"capture.max_bytes={max(sum(sizes[at : at + 4]) for at in range(4)) // 1024 + 40} KiB"
-    text, deployment = split_by(hub_run, BY_TIME, "capture.last=20 ms", quota, "capture.reserve=64 KiB")
-    writer = CaptureWriter(tmp_path / "run.mcap", deployment, NAME, text, METADATA)
-    for closing in hub_run.closings:
-        writer.keep(closing)
-    writer.finish()
+    writer = write(tmp_path / "run.mcap", hub_run, BY_TIME, "capture.last=20 ms", quota, "capture.reserve=64 KiB")
     assert writer.statistics().refused == 0 and open_capture(tmp_path / "run.mcap").ticks[-1] == 64
     assert writer.statistics().bytes == sum(file.stat().st_size for file in files_from(tmp_path / "run.mcap"))
     without = write(tmp_path / "b" / "run.mcap", hub_run, BY_TIME, quota, "capture.reserve=64 KiB")

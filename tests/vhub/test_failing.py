@@ -15,6 +15,7 @@ import msgspec
 import pytest
 
 from foosim.capture import contents as capture_contents
+from foosim.capture import file as capture_file
 from foosim.capture.info import capture_info
 from foosim.capture.parts import end_of, has_end
 from foosim.capture.reader import open_capture
@@ -31,8 +32,7 @@ from foosim.runtime.journal import Journal, journal_files
 from foosim.runtime.roles.shell import Process
 from foosim.runtime.transport.session import Session
 from foosim.vhub.main import HubOptions, HubShell
-from foosim.vhub.recording import file as capture_file
-from foosim.vhub.recording.file import CaptureFile, Described
+from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import UNCLEAN, recover_capture
 from foosim.vhub.state.records import HeadRecord, HubRecord, TickRecord
 from tests.vhub.conftest import NAME
@@ -58,11 +58,10 @@ def plane() -> Iterator[Session]:
 def leave(folder: Path, run: HubRun, without: int = -1) -> Path:
     """Leave what a vHub that was killed does: a capture of some ticks, a journal of all, but perhaps one."""
     path = folder / "run.mcap"
-    file = CaptureFile(path, Described(run.deployment, NAME, run.text, {"run": "run-1"}))
+    writer = Recorder(path, run.deployment, NAME, run.text, {"run": "run-1"})
     for closing in run.closings[:CAPTURED]:
-        file.write(closing)
-    file.end_chunk()
-    file.close()
+        writer.keep(closing)
+    writer.leave()
     with Journal(folder / "journals", "vhub") as journal:
         head = decode_any(HeadRecord, run.journal[0])
         journal.append(encode(msgspec.structs.replace(head, capture=str(path))))

@@ -62,7 +62,7 @@ def callers():
 
 def in_vhub():
     names = [*callers()]
-    return any(name.startswith("foosim.vhub.") for name in names) and (
+    return any(name.startswith(("foosim.vhub.", "foosim.capture.writer")) for name in names) and (
         "trial" in acts or "foosim.deployment.loader" not in names
     )
 

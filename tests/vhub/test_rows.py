@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foosim.capture.columns import Packets, frames_of, word_of
+from foosim.capture.file import Entry, epoch_row
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import (
     AGES,
@@ -43,9 +44,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.vhub.network.memory import FlightState
 from foosim.vhub.network.packet import Flight, flight_of, level_cdbm, state_of
 from foosim.vhub.recording.rows_of_closing import (
-    Entry,
     edit_row,
-    epoch_entry,
     packet_entry,
     packet_row,
     plan_of,
@@ -69,7 +68,10 @@ def entries(hub_run: HubRun) -> list[Entry]:
     """All rows of the run, in the order in which a writer writes them."""
     plan = plan_of(hub_run.deployment)
     known: Frame | None = None
-    made: list[Entry] = [epoch_entry(epoch, plan) for epoch in hub_run.epochs]
+    made: list[Entry] = []
+    for epoch in hub_run.epochs:
+        at_ns = epoch.tick * plan.tick_ns
+        made.append(("/epochs", at_ns, at_ns, epoch.tick, epoch_row(epoch)))
     for closing in hub_run.closings:
         made += [*world_rows(closing, plan, known), *map(packet_entry, closing.fates)]
         known = closing.frame

@@ -14,8 +14,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from foosim.analysis.export import export_capture
 from foosim.capture.cut import cut_capture
+from foosim.capture.export import export_capture
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.simulation.run import rehearse
 from foosim.world.components.fitted import sensors_of

@@ -53,7 +53,7 @@ def test_a_clog_holds_back_a_share_and_costs_others_nothing(restarts: bool, monk
 def test_explain_says_that_there_was_no_room(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(limits, "TRANSIT_BYTES_MAX", 2 * KIB)
     run = drive(12)
-    capture = open_capture(write_capture(tmp_path / "run.mcap", run))
+    capture = open_capture(write_capture(tmp_path / "run.mcap", run).path)
     fates = [flight for closing in run.closings for flight in closing.fates]
     flight = next(flight for flight in fates if flight.cause == "transit_full")
     which = PacketName(flight.source, flight.sequence, flight.destination, flight.copy)

@@ -15,7 +15,7 @@ from typing import Any, Final
 import pytest
 from jsonschema import Draft202012Validator
 
-from foosim.analysis.export import export_capture
+from foosim.capture.export import export_capture
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.common.errors import BadValue, DeploymentError, Refused, UnknownName

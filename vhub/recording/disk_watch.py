@@ -12,9 +12,9 @@ import os
 from pathlib import Path
 from typing import Any, Final
 
+from foosim.capture.writer import CaptureState, CaptureWriter
 from foosim.protocol.run_status import CLOSING, NOT_RECORDED
 from foosim.runtime.disk import Level, room_on_disk
-from foosim.vhub.recording.writer import CaptureState, CaptureWriter
 
 LOOK_NS: Final = 1_000_000_000
 """How often the journal's disk is checked."""
@@ -26,7 +26,7 @@ COUNT_NS: Final = 1_000_000_000
 
 
 class DiskProgress:
-    """The disk of one existing file."""
+    """The disk of one existing file or folder."""
 
     def __init__(self, path: Path, devices: Path = DEVICES) -> None:
         device = path.stat().st_dev
@@ -59,7 +59,7 @@ class RoomWatch:
         self._level = Level.FINE
         self._journal_level = Level.FINE
         self._look_ns = 0
-        self._disk = None if capture is None else DiskProgress(capture.path)
+        self._disk = None if capture is None else DiskProgress(capture.path.parent)
 
     def look(self, now_ns: int) -> list[tuple[str, str]]:
         """Return new log lines as (level, text)."""

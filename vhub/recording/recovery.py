@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -18,9 +17,10 @@ from typing import Final
 
 import msgspec
 
-from foosim.capture.contents import CHUNK_BYTES, check_new, sync_folder
+from foosim.capture.contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK, check_new
+from foosim.capture.file import CaptureFile, Line, described_as, one_file
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.parts import AFTER, LAST, PART, files_from, whole_path
+from foosim.capture.parts import files_from, whole_path
 from foosim.capture.reader import TICK_MARKS, About, Scan, deployment_of, read_about
 from foosim.capture.rows import TICK
 from foosim.common import limits
@@ -33,8 +33,7 @@ from foosim.protocol.messages import Epoch
 from foosim.runtime.disk import room_on_disk, size_like
 from foosim.runtime.journal import JournalError, journal_files, lock_journal, read_journal
 from foosim.vhub.network.packet import IN_FLIGHT
-from foosim.vhub.recording.file import CaptureFile, Described, Line
-from foosim.vhub.recording.unfinished import progress
+from foosim.vhub.recording.rows_of_closing import plan_of, tick_of
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, fold
 
@@ -111,34 +110,16 @@ def check_finished(path: Path) -> None:
 
 
 def _recover(about: About, records: Iterable[bytes], out: Path) -> Recovered:
-    """Write the new file; it is renamed to its path after its sync."""
+    """Write the new file: the rows that are there, and those that the journal has beyond them."""
     check_new(out)
-    part = out.with_name(f".{out.name}.part")
-    with suppress(OSError):
-        part.unlink()
-    try:
-        found = _write(about, records, part, out)
-        part.rename(out)
-        sync_folder(out.parent)
-    except OSError as error:
-        raise CaptureError(f"{out}: cannot be written, {error.strerror}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
-    return found
-
-
-def _write(about: About, records: Iterable[bytes], part: Path, out: Path) -> Recovered:
     deployment = deployment_of(about)
-    metadata = {key: value for key, value in about.metadata.items() if key not in (PART, AFTER, LAST)}
-    whole = deployment.model_copy(update={"capture": deployment.capture.model_copy(update=_ONE_FILE)})
-    file = CaptureFile(part, Described(whole, about.deployment_name, about.deployment_text, metadata, about.versions))
-    try:
+    cut = {key: about.metadata[key] for key in (CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN) if key in about.metadata}
+    with one_file(out, described_as(about, cut)) as file:
         needed = sum(left.stat().st_size for left in files_from(about.path))
-        room = room_on_disk(part.parent, deployment.capture.reserve_bytes)
+        room = room_on_disk(out.parent, deployment.capture.reserve_bytes)
         if room.left - needed < room.reserve:
             raise CaptureError(f"{out}: needs {size_like(needed, room.reserve)} or more, there are {room}")
-        torn_bytes, damage = _copy(about.path, file)
+        _, torn_bytes, damage = file.take(about.path)
         had = file.done.tick
         completion = _Completion(deployment, about.metadata.get("run", ""), records)
         completion.write(file)
@@ -147,27 +128,7 @@ def _write(about: About, records: Iterable[bytes], part: Path, out: Path) -> Rec
         file.write(Line("warning", str(found), max(0, found.tick)))
         end = {"reason": UNCLEAN, "torn_bytes": str(torn_bytes), "added_ticks": str(found.added_ticks)}
         file.finish({**end, "problem": problem} if problem else end)
-    finally:
-        file.close()
     return found
-
-
-_ONE_FILE: Final = {"split_bytes": None, "split_ns": None}
-
-
-def _copy(path: Path, file: CaptureFile) -> tuple[int, str]:
-    """Copy the valid chunks; return the number of bytes cut after them, and the damage, empty where there is none."""
-    scan, last, damage = Scan(path), dict[str, bytes](), ""
-    try:
-        for message in scan.messages():
-            file.copy(message)
-            last[message.topic] = message.data
-            if file.mcap.chunk_bytes > CHUNK_BYTES:
-                file.end_chunk()
-    except CaptureError as error:
-        damage = str(error)
-    file.done = progress(lambda topic: last.get(topic, b""))
-    return scan.about.unfinished_bytes, damage
 
 
 class _Completion:
@@ -176,7 +137,7 @@ class _Completion:
     def __init__(self, deployment: Deployment, run: str, records: Iterable[bytes]) -> None:
         self.problem = ""
         self.first_tick = limits.COUNTER_MAX
-        self._deployment = deployment
+        self._deployment, self._plan = deployment, plan_of(deployment)
         self._records = iter(records)
         self._head = b""
         try:
@@ -198,9 +159,8 @@ class _Completion:
         last: tuple[HubState, Closing] | None = None
         try:
             for last in fold(self._deployment, self._told_of(file)):
-                file.write(last[1])
-                if file.mcap.chunk_bytes > CHUNK_BYTES:
-                    file.end_chunk()
+                file.write(tick_of(last[1], self._plan))
+                file.end_large_chunk()
         except (Malformed, JournalError) as error:
             self.problem = f"its journal cannot be used to its end: {error}"
         if last is not None:
@@ -209,7 +169,8 @@ class _Completion:
             for flight in flights:
                 flight.cause = IN_FLIGHT
             ages = state.ages.unreported(state.closed)
-            file.write(Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages))
+            end = Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages)
+            file.write(tick_of(end, self._plan))
 
     def _told_of(self, file: CaptureFile) -> Iterator[bytes]:
         """Yield the records, and write the epochs among them that the file lacks."""

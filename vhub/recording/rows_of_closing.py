@@ -11,11 +11,11 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
+from foosim.capture.file import Entry, Tick, frame_row
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.rows import (
     AGES,
     CLIENTS,
-    EPOCHS,
     FRAME,
     LAYOUT,
     PACKETS,
@@ -27,12 +27,8 @@ from foosim.capture.rows import (
     DeliveredRow,
     EditRow,
     EntityRow,
-    EpochRow,
     Fate,
-    FrameRow,
     LayoutRow,
-    OutboxRow,
-    OwnerRow,
     PacketRow,
     RecoveryRow,
     Row,
@@ -41,7 +37,7 @@ from foosim.capture.rows import (
 )
 from foosim.common.keyed_random import Slot
 from foosim.deployment.schema import Deployment
-from foosim.protocol.messages import Epoch, Recovered
+from foosim.protocol.messages import Recovered
 from foosim.vhub.network.ages import quantile
 from foosim.vhub.network.air import DEAF
 from foosim.vhub.network.memory import Age
@@ -53,9 +49,6 @@ from foosim.vhub.stages.receiver import RECEIVER_FULL
 from foosim.vhub.state.records import Closing
 from foosim.world.edits import Add, Disrupt, Edit, Push, Remove
 from foosim.world.frame import Frame
-
-Entry = tuple[str, int, int, int, Row]
-"""A row with its place: topic, log time and publish time (simulated ns), sequence number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +104,18 @@ def add_packets(mcap: McapWriter, channel: int, flights: list[Flight], encode: C
     for flight in sorted(flights, key=_log_time):
         _, log_ns, publish_ns, sequence, row = packet_entry(flight)
         mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row))
+
+
+def tick_of(closing: Closing, plan: Plan) -> Tick:
+    """Return what a capture takes of a closing; its rows are made in the thread that writes them."""
+
+    def rows(known: Frame | None) -> list[Entry]:
+        return world_rows(closing, plan, known)
+
+    def packets(mcap: McapWriter, channel: int, encode: Callable[[Row], bytes]) -> None:
+        add_packets(mcap, channel, closing.fates, encode)
+
+    return Tick(closing.frame, closing.digest, closing.chain, rows, packets, len(closing.fates), closing.sensed)
 
 
 def _log_time(flight: Flight) -> int:
@@ -238,14 +243,6 @@ def _tick_row(closing: Closing) -> TickRow:
     )
 
 
-def epoch_entry(epoch: Epoch, plan: Plan) -> Entry:
-    """Return the row of an epoch, in its place."""
-    at_ns = epoch.tick * plan.tick_ns
-    owners = [OwnerRow(robot, node) for robot, node in epoch.owners]
-    row = EpochRow(epoch.tick, epoch.epoch, epoch.digest.hex(), list(epoch.roster), owners, epoch.arithmetic.hex())
-    return EPOCHS, at_ns, at_ns, epoch.tick & 0xFFFF_FFFF, row
-
-
 def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
     """Return the row of a loss or return, at the last tick before it."""
     at_ns = entry.tick * plan.tick_ns
@@ -262,11 +259,6 @@ def layout_row(frame: Frame) -> LayoutRow:
         layout.size,
         [EntityRow(e.name, e.model, e.start, e.split, e.stop) for e in layout.entities],
     )
-
-
-def frame_row(frame: Frame) -> FrameRow:
-    """Return the row of a frame."""
-    return FrameRow(frame.tick, frame.values.tobytes(), [OutboxRow(*item) for item in frame.outboxes.items()])
 
 
 def _client_rows(closing: Closing) -> list[ClientRow]:

@@ -65,8 +65,8 @@ class Past:
     """Numbered downlinks outside of lockstep, by client."""
     owing: list[str] = field(default_factory=list)
     """Clients that left at the last tick, owing its Done."""
-    known: Frame | None = None
-    """The last frame in the capture."""
+    known: Closing | None = None
+    """The last frame in the capture, with digest and chain."""
     kept: list[RecordClosing | RecordEpoch] = field(default_factory=list)
     """Closings and epochs that the capture lacks, in order."""
 
@@ -98,7 +98,8 @@ def recall(
     past = Past(fold.state, fold.layout)
     _remember(past, *_deliveries_of(fold.state))
     if captured is not None and captured.tick == fold.state.closed:
-        past.known = _frame(fold)
+        known = _frame(fold)
+        past.known = None if known is None else Closing(known, known.digest, [], [], chain=fold.chain)
     closings: dict[int, Closing] = {}
     for folded in fold:
         _remember(past, folded.record.tick + 1, folded.record.deliveries)
@@ -107,7 +108,7 @@ def recall(
         if captured is not None and folded.record.tick > captured.tick:
             closings[folded.record.tick] = folded.closing
         elif captured is not None and folded.record.tick == captured.tick:
-            past.known = folded.closing.frame
+            past.known = folded.closing
     if captured is not None:
         past.kept = list(_not_captured(found, closings, captured.epoch))
     past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
@@ -179,10 +180,10 @@ def _number(past: Past, folded: Folded) -> None:
             past.downlinks.setdefault(name, []).append((member.downlink, encode(down)))
 
 
-def first_tick_of(records: Sequence[bytes]) -> int | None:
+def first_tick_of(deployment: Deployment, records: Sequence[bytes]) -> int | None:
     """Return the first tick of which a journal has a record, or would have; None when there is no journal."""
-    ticks = (record.tick for raw in records if isinstance(record := decode_any(HubRecord, raw), TickRecord))
-    return next(ticks, limits.COUNTER_MAX) if records else None
+    head = decode_any(HubRecord, records[0]) if records else None
+    return HubState.restore(deployment, head.state).closed + 1 if isinstance(head, HeadRecord) else None
 
 
 def last_tick_of(records: Sequence[bytes]) -> int:

@@ -14,9 +14,9 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Final, Literal, TextIO
 
-from foosim.analysis.new_file import check_name, new_file
-from foosim.analysis.tables import Column, Kind, Table, table_of
+from foosim.capture.new_file import check_name, new_file
 from foosim.capture.reader import Scan, deployment_of
+from foosim.capture.tables import Column, Kind, Table, table_of
 from foosim.common.errors import BadValue, Failed
 
 Format = Literal["csv", "parquet"]

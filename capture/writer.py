@@ -13,19 +13,15 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Final
 
 from foosim.capture import contents as capture_contents
+from foosim.capture.file import CaptureFile, Described, Item, Line, Tick
 from foosim.common import limits
-from foosim.deployment.schema import Deployment
-from foosim.protocol.messages import Epoch
 from foosim.runtime.disk import Level
-from foosim.vhub.recording.file import CaptureFile, Described, Item, Line
-from foosim.vhub.state.records import Closing
-from foosim.vhub.state.resume import Captured
 
 GATHER_S: Final = 0.02
 """How long the writer collects closings: it wakes once for several, and takes the interpreter's lock less often."""
@@ -62,35 +58,32 @@ class CaptureState:
 
 
 class CaptureWriter:
-    """Writes one capture. `metadata` (texts: run, fingerprint, ...) is added to that of the deployment.
+    """Writes one capture in a thread.
 
     Raises CaptureError when the file exists already (it is never overwritten) or cannot be written. With `journal_tick`
-    a file that this run left unfinished is gone on with (`CaptureFile`): `keep` everything that the journal has, from
-    that tick on; what the file has already is not written again. `say` takes what people should know, as (level, text).
-    `keep`, `log`, `finish` and `leave` are for one thread.
+    it continues a capture that this run left unfinished (`CaptureFile`): `put` everything that the journal has, from
+    that tick on; what is in the capture is not written again. `say` takes messages for people as (level, text).
+    `put`, `log`, `finish` and `leave` are for one thread.
     """
 
     def __init__(
         self,
         path: Path,
-        deployment: Deployment,
-        deployment_name: str,
-        deployment_text: str,
-        metadata: Mapping[str, str],
+        described: Described,
         say: Callable[[str, str], None] | None = None,
         journal_tick: int | None = None,
     ) -> None:
         self.path = path
         self._say = say or (lambda level, text: None)
-        self._flush_ns = deployment.capture.flush_ns
+        self._flush_ns = described.deployment.capture.flush_ns
         self.state = CaptureState()
         self.states: deque[CaptureState] = deque()
         """The states in order, for one reader, which removes them: the thread may change state more than once between
         two readings."""
-        self.stops_world = deployment.capture.on_full == "stop_world"
+        self.stops_world = described.deployment.capture.on_full == "stop_world"
         self._offered = self._written = self._refused = self._pending = self._passed = 0
-        """Rows by their end; pending ones are in the chunk that is being collected, passed ones were in the resumed
-        file."""
+        """Rows by their end, with those that a resumed capture has; pending ones are in the chunk that is being
+        collected, passed ones came again."""
         self._error: BaseException | None = None
         self._queue: deque[Item] = deque()
         self._queued_rows = self._waits = 0
@@ -102,29 +95,25 @@ class CaptureWriter:
         """Whether the thread waits for a notification of the next row."""
         self._changed = threading.Condition()
         """Guards the queue, the error and the ends; notified when they change."""
-        described = Described(deployment, deployment_name, deployment_text, metadata)
         self._file = CaptureFile(path, described, journal_tick)
-        self.begun_with = Captured(self._file.done.tick, max(0, self._file.done.epoch))
-        """How far the resumed file was."""
+        self._offered = self._written = self._file.rows_before
+        self.begun_with = replace(self._file.done)
+        """How far the resumed capture was."""
         self.has_ended = False
         """Whether the thread has ended."""
         self.on_end: Callable[[], None] = lambda: None
         """Called at the end of the thread, in it."""
         self.while_waiting: Callable[[], None] = lambda: None
-        """Called repeatedly while `keep` or `log` waits, in the caller's thread."""
+        """Called repeatedly while `put` or `log` waits, in the caller's thread."""
         self._thread = threading.Thread(target=self._run, name="capture", daemon=True)
         self._syncer = _Syncer(self._file)
         self._thread.start()
 
     # --- what the owner calls ----------------------------------------------------------------------------------------
 
-    def keep(self, item: Closing | Epoch) -> None:
-        """Queue a closing, or an epoch that begins; wait while the queue is full."""
-        self._put(item)
-
     def log(self, level: str, text: str, tick: int) -> None:
         """Queue a log line of the run; `level` is info, warning or error."""
-        self._put(Line(level, text, tick))
+        self.put(Line(level, text, tick))
 
     def finish(self, metadata: Mapping[str, str] | None = None) -> None:
         """Write the queue, the last frame and the summary; a second call does nothing. `metadata`: the result."""
@@ -153,7 +142,7 @@ class CaptureWriter:
     def leave(self) -> None:
         """Write the queue and close the file unfinished: a vHub with its journal can resume it.
 
-        A second call does nothing. It raises nothing, since it comes behind what is wrong.
+        A second call does nothing. It raises nothing, since it follows an error.
         """
         self._end()
 
@@ -172,7 +161,8 @@ class CaptureWriter:
         counts = self._offered - self._passed, self._written, self._refused, self._queued_rows, self._waits
         return CaptureStatistics(self._file.total_bytes, *counts, self.synced_tick)
 
-    def _put(self, item: Item) -> None:
+    def put(self, item: Item) -> None:
+        """Queue a closed tick, an epoch that begins, or a log line; wait while the queue is full."""
         rows = _rows_in(item)
         with self._changed:
             assert not self._is_over, "a row after the end"
@@ -320,7 +310,7 @@ class CaptureWriter:
             return items, self._is_over and not self._queue
 
     def _write_item(self, item: Item) -> None:
-        if isinstance(item, Closing) and self._file.begins_next(item):
+        if isinstance(item, Tick) and self._file.begins_next(item):
             self._begin_next(item)
         if self.state.level is Level.OUT:
             self._refused += _rows_in(item)
@@ -329,7 +319,7 @@ class CaptureWriter:
         else:
             self._passed += _rows_in(item)
 
-    def _begin_next(self, closing: Closing) -> None:
+    def _begin_next(self, closing: Tick) -> None:
         """Begin the next file with a closing, when all earlier items are written."""
         self._flush()
         try:
@@ -380,4 +370,4 @@ class _Syncer:
 
 
 def _rows_in(item: Item) -> int:
-    return 1 + len(item.fates) if isinstance(item, Closing) else 1
+    return 1 + item.packets if isinstance(item, Tick) else 1

@@ -1,7 +1,7 @@
-"""Decides when a capture continues in a new file, what that file begins with, and which old files are removed.
+"""The files of a capture that is written: when the next one begins, its metadata, and which old files are removed.
 
-A file begins with a captured frame that would be there anyway, so all rows of all files are those of one that is not
-split.
+By size or time a file begins with a captured frame that would be there anyway. A restarted writer begins one with the
+last frame that is there, which the first chunk repeats. So all rows of all files are those of one file.
 """
 
 from __future__ import annotations
@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from foosim.capture.contents import CUT, CUT_CHAIN, CUT_DIGEST, CUT_TICK
-from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.parts import AFTER, LAST, ORIGIN_TICK, PART, head_of, number_of, part_path, parts_at
+from foosim.capture.left import Left
+from foosim.capture.parts import AFTER, AFTER_BYTES, LAST, ORIGIN_TICK, PART, head_of, number_of, part_path, parts_at
 from foosim.capture.state_at import ActiveState
 from foosim.common.units import format_ns
 from foosim.deployment.schema import Capture
-from foosim.vhub.state.records import Closing
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +34,7 @@ class Split:
         self._tick_ns = tick_ns
         self._every = capture.frames_every
         self._bytes_max, self._span_ns, self._last_ns = capture.split_bytes, capture.split_ns, capture.last_ns
+        self._is_split = capture.is_split
         self._first_tick = -1
         self._described_bytes = 0
         self._earlier: list[_File] = []
@@ -50,28 +50,18 @@ class Split:
         """Size of the files before it, in bytes."""
         return sum(file.bytes for file in self._earlier)
 
-    def take_over(self, number: int, described_bytes: int, *, is_empty: bool) -> None:
-        """Resume with the file of this number; `is_empty`: it has no tick. Raises CaptureError for an invalid file."""
-        self.number, self._described_bytes = number, described_bytes
-        for known, path in parts_at(self._path).items():
-            if known > number:
-                break
-            head = head_of(path)
-            if PART not in head or number_of(path, head) != known:
-                raise CaptureError(f"{path}: is not the file of number {known} of {self._path}")
-            begin = next((entry for entry in (CUT_TICK, ORIGIN_TICK) if entry in head), None)
-            first_tick = 0 if begin is None else number_of(path, head, begin)
-            if known < number:
+    def follow(self, left: Left) -> None:
+        """Continue with the file after those that were left. Raises CaptureError for an invalid one."""
+        for number, path in parts_at(self._path).items():
+            if number <= left.number:
+                head = head_of(path)
+                begin = next((entry for entry in (CUT_TICK, ORIGIN_TICK) if entry in head), None)
+                first_tick = 0 if begin is None else number_of(path, head, begin)
                 self._earlier.append(_File(path, first_tick, path.stat().st_size))
-            else:
-                self._first_tick = -1 if is_empty else first_tick
-
-    def begin(self, number: int, described_bytes: int) -> None:
-        """Record that a file is begun, with its length before the first row."""
-        self.number, self._described_bytes, self._first_tick = number, described_bytes, -1
+        self.number, self.in_force = left.number + 1, left.in_force
 
     def wrote(self, tick: int) -> None:
-        """Record that a closing is written."""
+        """Record that a closing is written, or repeated at the beginning of a file."""
         if self._first_tick < 0:
             self._first_tick = tick
 
@@ -80,20 +70,28 @@ class Split:
 
         It is never as short as what describes it.
         """
-        if tick % self._every or not 0 <= self._first_tick < tick:
+        if not self._is_split or tick % self._every or not 0 <= self._first_tick < tick:
             return False
         is_long = self._span_ns is not None and (tick - self._first_tick) * self._tick_ns >= self._span_ns
         return is_long or (self._bytes_max is not None and size >= max(self._bytes_max, 2 * self._described_bytes))
 
-    def entries(self, closing: Closing | None = None) -> dict[str, str]:
-        """Return the own metadata of the first file, or of the next one, which begins with a closing."""
-        own = {} if self._last_ns is None else {LAST: format_ns(self._last_ns)}
-        if closing is None:
-            return {**own, PART: "0"}
-        assert closing.chain, "a closing knows the chain up to its frame"
-        own |= {PART: str(self.number + 1), AFTER: self.path.name, CUT: self._path.name}
-        digest, chain = closing.digest.hex(), closing.chain.hex()
-        return {**own, CUT_TICK: str(closing.frame.tick), CUT_DIGEST: digest, CUT_CHAIN: chain}
+    def first_entries(self) -> dict[str, str]:
+        """Return the own metadata of the first file."""
+        return {**self._kept, PART: "0"} if self._is_split else {}
+
+    def entries(self, number: int, stop: int | None) -> dict[str, str]:
+        """Return the own metadata of a further file; `stop`: the bytes that count of one before without an end."""
+        own = {**self._kept, PART: str(number), AFTER: part_path(self._path, number - 1).name}
+        return own if stop is None else {**own, AFTER_BYTES: str(stop)}
+
+    def begin_entries(self, tick: int, digest: bytes, chain: bytes) -> dict[str, str]:
+        """Return the metadata of the frame that a further file begins with."""
+        assert chain, "a closing has the chain up to its frame"
+        return {CUT: self._path.name, CUT_TICK: str(tick), CUT_DIGEST: digest.hex(), CUT_CHAIN: chain.hex()}
+
+    @property
+    def _kept(self) -> dict[str, str]:
+        return {} if self._last_ns is None else {LAST: format_ns(self._last_ns)}
 
     def begin_next(self, tick: int, size: int, described_bytes: int) -> list[Path]:
         """Record that the next file begins at a tick, and the size of the one before; return the files to remove.
@@ -101,7 +99,7 @@ class Split:
         Of the files before stays what has something of the last `capture.last`.
         """
         self._earlier.append(_File(self.path, self._first_tick, size))
-        self.begin(self.number + 1, described_bytes)
+        self.number, self._described_bytes, self._first_tick = self.number + 1, described_bytes, -1
         gone: list[Path] = []
         while self._last_ns is not None and len(self._earlier) > 1:
             if self._earlier[1].first_tick * self._tick_ns > tick * self._tick_ns - self._last_ns:
