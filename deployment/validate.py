@@ -26,6 +26,7 @@ from foosim.common.units import format_ns, format_rate
 from foosim.deployment.schema import Deployment, Player
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.validate_network import Names, check_network, place_findings, rule_findings
+from foosim.world.air import WindSettings
 from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.used_forms import foreign_versions
 from foosim.world.components.view import IncompatibleComponent, Mounting
@@ -68,7 +69,6 @@ from foosim.world.layout import (
 )
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.moving.upright import stands_upright
-from foosim.world.rules.wind import WindSettings
 from foosim.world.scenery import SceneryMesh
 
 REACHED: Final = ("rod", "ball")

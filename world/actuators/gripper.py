@@ -7,16 +7,13 @@ of the link at the grasp; so whoever solves the two next holds them by the same.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Annotated, ClassVar, Final
+from typing import ClassVar, Final
 
 from msgspec import Struct
 
-from foosim.common import units
-from foosim.common.spec_base import default
-from foosim.common.units import Quantity
 from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
-from foosim.world.components.grasping import Portable, distance_from, grasp_of, portables_of
+from foosim.world.components.grasping import GripperSettings, Portable, distance_from, grasp_of, portables_of
 from foosim.world.components.mounted import body_at, link_index
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.forms import registry
@@ -24,14 +21,9 @@ from foosim.world.forms.forms import ENGINES, ENTITY, NO_ENTITY
 from foosim.world.forms.jobs import FAILURE, JobState
 from foosim.world.forms.quantities import JobNumber, Share
 from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings, Tag
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.scene import moved, rotate
 
-Reach = Annotated[float, Quantity(units.LENGTH, "1 mm", "2 m")]
-Opening = Annotated[float, Quantity(units.LENGTH, "1 mm", "10 m")]
-Load = Annotated[float, Quantity(units.MASS, "1 g", "100000 kg")]
 VALID: Final = "valid on robots that the engine solves, as urdf, quadrotor, differential_drive with dynamics: rigid"
 HALF: Final = 0.5
 """A command from here on means closed."""
@@ -46,20 +38,6 @@ class GraspFailure(IntEnum):
     TOO_WIDE = 3
     TOO_HEAVY = 4
     QUARANTINED = 5
-
-
-class GripperSettings(ActuatorSettings):
-    """Holds an object. `at` is the grip: a place on a link of the robot.
-
-    It takes an object whose surface is at most `reach` from the grip, whose least side is at most `opening`, and whose
-    mass is at most `mass`; with a `tag`, one that has it.
-    """
-
-    at: MountedAt = FIRST_LINK
-    reach: Reach = default("5 cm")
-    opening: Opening = default("50 cm")
-    mass: Load = default("10 kg")
-    tag: Tag | None = None
 
 
 class Grip(Struct, frozen=True):

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from foosim.common.finding import Finding
 from foosim.world.components.base import Kit
+from foosim.world.components.reach import MARGIN_M, Reach
 from foosim.world.forms.registry import kit
+from foosim.world.layout import Layout
 from foosim.world.matter.physics import DEFAULT, Contact, Physics, Side
+from foosim.world.models.rod import RodRobot, line_x_m
 from foosim.world.parameters.table import TABLE, Surface, Table
 from foosim.world.parameters.table_checks import table_findings
 from foosim.world.parameters.table_presets import PRESETS
@@ -68,6 +71,27 @@ class TableKit(Kit):
         sides[BALL] = Side(bounce, grip)
         sides[DEFAULT] = sides[WALLS]  # of bodies that are no part of a table
         return Physics(table.gravity, surfaces, between, table.solver_iterations, table.contact_erp, sides)
+
+    def reach(self, layout: Layout) -> Reach:
+        """Return the bounding volumes of rods and balls, grown by the speed limit of a ball."""
+        table, spec = self._table, self._spec
+        rod, rods = table.rod, []
+        half = rod.foot.length / 2
+        corner = sqrt(rod.foot_radius * rod.foot_radius + half * half)
+        for entity in layout.of("rod"):
+            robot = spec.robots[entity.name]
+            assert isinstance(robot, RodRobot)
+            rods.append((entity.index, entity.name, line_x_m(spec, robot)))
+        rods.sort(key=lambda rod: (rod[2], rod[1]))
+        return Reach(
+            ball_m=table.ball.radius + table.ball.speed_limit * (spec.tick_ns / 1e9) + MARGIN_M,
+            rods=tuple(rods),
+            axes=tuple(axis for _, _, axis in rods),
+            half_width_m=corner + MARGIN_M,
+            z_low_m=rod.axis_height - corner - MARGIN_M,
+            z_high_m=rod.axis_height + corner + MARGIN_M,
+            balls=tuple((entity.index, entity.offsets["position"]) for entity in layout.of("ball")),
+        )
 
     def findings(self) -> Iterator[Finding]:
         """Yield the scenery that the table's bodies pass through."""

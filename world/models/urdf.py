@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Annotated, Final
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, StringConstraints
 
@@ -12,7 +12,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.bodies.urdf import Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
+from foosim.world.bodies.urdf import SUFFIX, Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
@@ -22,8 +22,6 @@ from foosim.world.placing import At
 from foosim.world.scene import Body, Link
 from foosim.world.scenery import AssetPath
 from foosim.world.spec import WorldSpec
-
-SUFFIX: Final = ".urdf"
 
 
 def _urdf_path(path: str) -> str:

@@ -30,6 +30,7 @@ from foosim.common.spec_base import (
     Torque,
 )
 from foosim.common.units import Quantity
+from foosim.world.scene import PRIMITIVES_MAX
 from foosim.world.spec import WorldSpec
 
 TABLE: Final = "table"
@@ -154,8 +155,6 @@ class Rod(SpecBase):
         return STEEL_DENSITY * section * self.length
 
 
-PRIMITIVES_MAX: Final = 16
-"""Shapes of one link of a rod: those of a compound in Bullet."""
 FIGURES_MAX: Final = PRIMITIVES_MAX // 2
 """Figures of a rod: foot and body of each are boxes of one link."""
 

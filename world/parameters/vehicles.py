@@ -8,7 +8,6 @@ from typing import Annotated, Final
 from pydantic import AfterValidator
 
 from foosim.common import units
-from foosim.common.errors import BadValue
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.components.view import Mounting, WritableView
@@ -17,7 +16,7 @@ from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.matter.physics import DEFAULT
 from foosim.world.moving.upright import Upright
 from foosim.world.parameters.hall_bodies import DARK, mast
-from foosim.world.placing import ORIGIN_OF_WORLD, At
+from foosim.world.placing import ORIGIN_OF_WORLD, At, leaning
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, turn
 
 Radius = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 m")]
@@ -32,14 +31,6 @@ ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
 HULL: Final = DEFAULT
 """The surface of robots without rigid-body dynamics."""
-
-
-def leaning(at: At) -> BadValue | None:
-    """Return what is wrong with a place for what stands upright."""
-    for key, angle in (("roll", at.roll), ("pitch", at.pitch)):
-        if angle != 0.0:
-            return BadValue(f"what stands upright has no {key}", f"{angle:g} rad")
-    return None
 
 
 def _is_upright(at: At) -> At:
