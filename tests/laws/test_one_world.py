@@ -23,6 +23,7 @@ from foosim.common.errors import Malformed
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.settings import table_of
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
@@ -45,7 +46,6 @@ from foosim.world.edits import counters, parked
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, build_layout
-from foosim.world.parameters.table import table_of
 from tests.forms.test_forms import ALONE, own
 from tests.forms.worlds import DEPLOY, still
 from tests.frames import Frames

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foosim.players.beacons import (
+from foosim.library.mobile.players.beacons import (
     Beacon,
     Entry,
     Telemetry,

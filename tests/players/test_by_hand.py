@@ -16,11 +16,11 @@ import pytest
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
-from foosim.players.gamepad import AGAIN_TICKS, Gamepad
-from foosim.players.keyboard import SLIDE_M, SWING_RAD, Keyboard
-from foosim.players.table.by_hand import DRAWN_RAD, DRAWN_S, KICK_S, KICKED_RAD, LIFTED_RAD, SWING_RAD_MAX
-from foosim.world.actuators.rod_position import Command
-from foosim.world.parameters.table import table_of
+from foosim.library.table.players.by_hand import DRAWN_RAD, DRAWN_S, KICK_S, KICKED_RAD, LIFTED_RAD, SWING_RAD_MAX
+from foosim.library.table.players.gamepad import AGAIN_TICKS, Gamepad
+from foosim.library.table.players.keyboard import SLIDE_M, SWING_RAD, Keyboard
+from foosim.library.table.rod_position import Command
+from foosim.library.table.settings import table_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
@@ -30,7 +30,7 @@ PLAYS: Final = f"""
 import json, select, sys
 from pathlib import Path
 from foosim.deployment.loader import load_deployment
-from foosim.players.keyboard import Keyboard
+from foosim.library.table.players.keyboard import Keyboard
 deployment = load_deployment(Path({str(TABLE)!r}).read_text(), "table.yaml")
 player = Keyboard(deployment, {{"team": sys.argv[1]}})
 for turn in range(int(sys.argv[2])):

@@ -11,16 +11,16 @@ import pytest
 
 from foosim.client.player import Sample
 from foosim.deployment.loader import load_deployment
-from foosim.players.football import Keeper, Passive, Striker, Team
-from foosim.players.table.rod import TURN, Rod, Sight, View
-from foosim.players.table.senses import Senses, rods_of
-from foosim.players.table.shot import FULL, LIFTED, Shots
+from foosim.library.generic.delay import delay_ns
+from foosim.library.table.ball import BallPosition
+from foosim.library.table.encoder import RodPosition
+from foosim.library.table.players.football import Keeper, Passive, Striker, Team
+from foosim.library.table.players.rod import TURN, Rod, Sight, View
+from foosim.library.table.players.senses import Senses, rods_of
+from foosim.library.table.players.shot import FULL, LIFTED, Shots
+from foosim.library.table.rod_position import Command
+from foosim.library.table.settings import LINE_NAMES, table_of
 from foosim.simulation.run import rehearse
-from foosim.world.actuators.rod_position import Command
-from foosim.world.modifiers.delay import delay_ns
-from foosim.world.parameters.table import LINE_NAMES, table_of
-from foosim.world.sensors.ball import BallPosition
-from foosim.world.sensors.encoder import RodPosition
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)

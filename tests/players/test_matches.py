@@ -11,7 +11,7 @@ from typing import Final
 import pytest
 
 from foosim.deployment.loader import load_deployment
-from foosim.players import OF_THE_TABLE
+from foosim.library.table.players import OF_THE_TABLE
 from foosim.simulation.match.figures import chance
 from foosim.simulation.match.game import Fixture, Game, Played, play
 

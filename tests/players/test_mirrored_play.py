@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 import pytest
 
-from foosim.players.football import Playing
+from foosim.library.table.players.football import Playing
+from foosim.library.table.settings import LINE_NAMES
 from foosim.simulation.simulation import Simulation
 from foosim.world.frame import Frame
-from foosim.world.parameters.table import LINE_NAMES
 from tests.placing import place_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -9,15 +9,15 @@ from typing import Final
 import pytest
 
 from foosim.deployment.loader import load_deployment
-from foosim.players.table.motors import Motion, Motors
-from foosim.players.table.senses import rods_of
+from foosim.library.table.encoder import RodPosition
+from foosim.library.table.players.motors import Motion, Motors
+from foosim.library.table.players.senses import rods_of
+from foosim.library.table.rod_drives import RodLimits
+from foosim.library.table.rod_position import Command
+from foosim.library.table.settings import table_of
 from foosim.simulation.simulation import Simulation
-from foosim.world.actuators.rod_position import Command
 from foosim.world.components.entities import mounting_of
 from foosim.world.layout import build_layout
-from foosim.world.parameters.rod_drives import RodLimits
-from foosim.world.parameters.table import table_of
-from foosim.world.sensors.encoder import RodPosition
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

@@ -10,15 +10,15 @@ import pytest
 
 from foosim.client.player import Sample
 from foosim.deployment.loader import load_deployment
-from foosim.players.beacons import Beacon, decode_beacon, encode_beacon
-from foosim.players.roadmap import roadmap_of
-from foosim.players.warehouse_rover import Patrol
+from foosim.library.generic.pose import Pose
+from foosim.library.mobile.hall import hall_of
+from foosim.library.mobile.players.beacons import Beacon, decode_beacon, encode_beacon
+from foosim.library.mobile.players.roadmap import roadmap_of
+from foosim.library.mobile.players.warehouse_rover import Patrol
+from foosim.library.mobile.station import StationRobot
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
 from foosim.world.frame import Frame
-from foosim.world.models.station import StationRobot
-from foosim.world.parameters.hall import hall_of
-from foosim.world.sensors.pose import Pose
 
 ROVERS: Final = 6
 TICKS: Final = 1000

@@ -8,12 +8,12 @@ from math import pi
 import pytest
 
 from foosim.deployment.loader import load_deployment
-from foosim.players.roadmap import Roadmap, roadmap_of
-from foosim.players.steering import Estimate, Steering, least
-from foosim.world.actuators.wheel_speeds import Drive
-from foosim.world.parameters.hall import hall_of
-from foosim.world.sensors.odometry import WheelTravel
-from foosim.world.sensors.pose import Pose
+from foosim.library.generic.pose import Pose
+from foosim.library.mobile.hall import hall_of
+from foosim.library.mobile.odometry import WheelTravel
+from foosim.library.mobile.players.roadmap import Roadmap, roadmap_of
+from foosim.library.mobile.players.steering import Estimate, Steering, least
+from foosim.library.mobile.wheel_speeds import Drive
 
 FAR = (4.0,) * 16
 

@@ -13,9 +13,8 @@ import pytest
 
 from foosim.client.player import Sample
 from foosim.deployment.loader import load_deployment
-from foosim.players.yard_arm import NEAR_M, UPRIGHT, Arm
-from foosim.players.yard_quadrotor import Watch
-from foosim.players.yard_reports import (
+from foosim.library.mobile.players.yard_quadrotor import Watch
+from foosim.library.mobile.players.yard_reports import (
     REPORT,
     WATCH,
     Heard,
@@ -25,9 +24,10 @@ from foosim.players.yard_reports import (
     encode_report,
     encode_watch,
 )
+from foosim.library.rigid.joint_position import JointPositions
+from foosim.library.rigid.players.yard_arm import NEAR_M, UPRIGHT, Arm
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings
-from foosim.world.actuators.joints.joint_position import JointPositions
 from foosim.world.frame import Frame
 from tests.forms.worlds import DEPLOY
 

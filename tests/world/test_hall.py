@@ -12,10 +12,10 @@ import pytest
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import processes_of
+from foosim.library.mobile.hall_obstacles import obstacles_of, start_findings
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
-from foosim.world.clearance.hall_obstacles import obstacles_of, start_findings
 from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits
 from foosim.world.forms.registry import names
 from foosim.world.kinematics import forward_kinematics

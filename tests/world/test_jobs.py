@@ -13,9 +13,10 @@ from msgspec import Meta, Struct
 from foosim.client.player import Packet, Player
 from foosim.common.errors import DeploymentError, Refused
 from foosim.deployment.loader import load_deployment
+from foosim.library.generic.job import Jobs
+from foosim.library.mobile.go_to import Place
+from foosim.library.mobile.waypoint import Waypoint
 from foosim.simulation.simulation import Simulation
-from foosim.world.actuators.go_to import Place
-from foosim.world.actuators.waypoint import Waypoint
 from foosim.world.components.base import Actuator
 from foosim.world.forms import registry
 from foosim.world.forms.jobs import JobState
@@ -23,7 +24,6 @@ from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.quantities import JobNumber, Metres
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.sensors.job import Jobs
 from tests.kinematic_yard import yard_text
 
 NAME: Final = "yard.yaml"

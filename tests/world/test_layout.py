@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.table import BALL
 from foosim.world.components.view import Mounting
 from foosim.world.forms.forms import ABSENT
 from foosim.world.forms.registry import find_model, names
-from foosim.world.kits.table import BALL
 from foosim.world.layout import NOTHING, WORLD, Carried, Declared, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
