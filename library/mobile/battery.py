@@ -23,7 +23,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
-from foosim.library.mobile.hall import Capacity, Drag, Load, Voltage, hall_of
+from foosim.library.mobile.hall_settings import Capacity, Drag, Load, Voltage, hall_of
 from foosim.library.mobile.rover import CHARGE, Charge, RoverRobot
 from foosim.library.mobile.station import StationRobot
 from foosim.world.components.base import EntityRule, Sensor

@@ -13,11 +13,11 @@ from foosim.common.errors import BadValue
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity, custom_error
 from foosim.library.mobile.hall_bodies import DARK, mast
-from foosim.library.mobile.vehicles import Acceleration, Slip, Speed, TurnRate, Vehicle, leaning, mark_of
+from foosim.library.mobile.vehicles import Acceleration, Slip, Speed, TurnRate, Vehicle, mark_of
 from foosim.world.bodies.inertia import solid
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.matter.physics import DEFAULT, FRICTIONLESS
-from foosim.world.placing import ORIGIN_OF_WORLD, At
+from foosim.world.placing import ORIGIN_OF_WORLD, At, leaning
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, Sphere, Vector, turn
 
 Track = Annotated[float, Quantity(units.LENGTH, "1 cm", "20 m")]

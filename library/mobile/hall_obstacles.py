@@ -13,7 +13,7 @@ from math import floor
 from operator import itemgetter
 
 from foosim.common.finding import Finding
-from foosim.library.mobile.hall import Hall, hall_of
+from foosim.library.mobile.hall_settings import Hall, hall_of
 from foosim.library.mobile.rover import RoverRobot
 from foosim.library.mobile.station import StationRobot
 from foosim.world.fixed_scenery import fixed_shapes

@@ -10,8 +10,8 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.library.mobile.differential_drive import WheeledMotion
-from foosim.library.mobile.hall import Place, hall_of
 from foosim.library.mobile.hall_bodies import DARK, mast, standing
+from foosim.library.mobile.hall_settings import Place, hall_of
 from foosim.library.mobile.wheels import Wheels, slips_of
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from foosim.library.mobile.hall import Place, hall_of
 from foosim.library.mobile.hall_bodies import mast, standing
+from foosim.library.mobile.hall_settings import Place, hall_of
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.forms.registry import model

@@ -73,7 +73,8 @@ CASES = [
      " nearest is 'own_player:Acts'"),
     ("own_player.acts:Acts", "there is no module own_player.acts (own_player is a module, not a package)"),
     ("foosim.library.table.players.footbal:Team",
-     "there is no module foosim.library.table.players.footbal, nearest is 'foosim.library.table.players.football:Team'"),
+     "there is no module foosim.library.table.players.footbal, "
+     "nearest is 'foosim.library.table.players.football:Team'"),
     ("own_importer:Acts", "cannot be imported: ModuleNotFoundError: No module named 'own_missing'"
      " (own_importer.py:1)"),
     ("own_broken:Acts",

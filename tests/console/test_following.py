@@ -13,7 +13,7 @@ from foosim.console.shown.overlays import Overlays
 from foosim.console.shown.source import About, Moment, Wanted
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.generic.proximity import ProximitySettings
-from foosim.library.mobile.hall import hall_of
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Commit
 from foosim.world.assembly.initial_state import initial_frame

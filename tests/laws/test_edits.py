@@ -15,6 +15,7 @@ from foosim.capture.start_frame import read_branch
 from foosim.common.errors import BadValue, DeploymentError, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.library.generic.laser_scanner import Scan
+from foosim.library.mobile.battery import BatteryRule
 from foosim.runtime.roles.bus import Weather
 from foosim.simulation.run import rehearse
 from foosim.simulation.simulation import Simulation

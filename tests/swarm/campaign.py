@@ -19,7 +19,6 @@ from foosim.common.names import CHANNEL_ECHO
 from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.validate import rigid_bodies
-from foosim.library.rigid.gripper import GripperSettings
 from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.runtime.roles.bus import CALM, Weather
@@ -29,6 +28,7 @@ from foosim.simulation.stepped_world import SteppedWorld
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.components.grasping import GripperSettings
 from foosim.world.frame import Frame
 from tests.swarm.faults import (
     CHANGES_THE_WORLD,

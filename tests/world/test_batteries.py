@@ -9,7 +9,7 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
-from foosim.library.mobile.hall import hall_of
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.world.assembly.world import WorldMarks
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView

@@ -13,11 +13,11 @@ from msgspec import Meta, Struct
 from foosim.client.player import Packet, Player
 from foosim.common.errors import DeploymentError, Refused
 from foosim.deployment.loader import load_deployment
-from foosim.library.generic.job import Jobs
 from foosim.library.mobile.go_to import Place
 from foosim.library.mobile.waypoint import Waypoint
 from foosim.simulation.simulation import Simulation
 from foosim.world.components.base import Actuator
+from foosim.world.components.job_reading import Jobs
 from foosim.world.forms import registry
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.payloads import PayloadCodec

@@ -21,7 +21,6 @@ from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.generic.gps import GlobalPosition
 from foosim.library.generic.imu import Inertial
-from foosim.library.generic.job import Jobs
 from foosim.library.generic.laser_scanner import Scan
 from foosim.library.generic.pose import Pose
 from foosim.library.generic.pose_3d import Pose3d
@@ -57,6 +56,7 @@ from foosim.library.table.rod_force import RodForce
 from foosim.library.table.rod_position import Command
 from foosim.library.table.rod_velocity import RodVelocity
 from foosim.library.table.rod_voltage import RodVoltages
+from foosim.world.components.job_reading import Jobs
 from foosim.world.forms.payloads import PayloadCodec, field_at
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component, names

@@ -9,8 +9,8 @@ from math import ceil, hypot
 from typing import Final
 
 from foosim.deployment.schema import Deployment
-from foosim.library.mobile.hall import hall_of
 from foosim.library.mobile.hall_obstacles import obstacles_of
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.world.rays.outlines import Outline
 
 MARGIN_M: Final = 0.2

@@ -6,7 +6,7 @@ from math import atan2, cos, hypot, pi, sin
 from typing import Final
 
 from foosim.library.generic.pose import Pose
-from foosim.library.mobile.hall import Rover
+from foosim.library.mobile.hall_settings import Rover
 from foosim.library.mobile.odometry import WheelTravel
 from foosim.library.mobile.wheel_speeds import Drive
 

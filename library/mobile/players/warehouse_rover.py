@@ -22,8 +22,8 @@ from foosim.deployment.schema import Deployment
 from foosim.library.generic.pose import Pose
 from foosim.library.generic.proximity import Ranges
 from foosim.library.mobile.battery import Battery
-from foosim.library.mobile.hall import hall_of
 from foosim.library.mobile.hall_obstacles import obstacles_of
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.library.mobile.odometry import WheelTravel
 from foosim.library.mobile.players.beacons import (
     BEACON,

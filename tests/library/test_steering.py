@@ -9,7 +9,7 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.library.generic.pose import Pose
-from foosim.library.mobile.hall import hall_of
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.library.mobile.odometry import WheelTravel
 from foosim.library.mobile.players.roadmap import Roadmap, roadmap_of
 from foosim.library.mobile.players.steering import Estimate, Steering, least

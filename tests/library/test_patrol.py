@@ -11,7 +11,7 @@ import pytest
 from foosim.client.player import Sample
 from foosim.deployment.loader import load_deployment
 from foosim.library.generic.pose import Pose
-from foosim.library.mobile.hall import hall_of
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.library.mobile.players.beacons import Beacon, decode_beacon, encode_beacon
 from foosim.library.mobile.players.roadmap import roadmap_of
 from foosim.library.mobile.players.warehouse_rover import Patrol
