@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Final
 
+REACHED: Final = ("rod", "ball")
+"""The rigid models that may share a solve."""
 MARGIN_M = 0.001
 """Added to every bounding volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
 
