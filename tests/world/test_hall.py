@@ -125,7 +125,6 @@ def test_a_process_has_its_players_on_one_host() -> None:
 def test_robots_of_a_kit_need_its_section() -> None:
     neither = problems(WAREHOUSE.replace("\nhall:\n", "\nhal:\n"))
     assert "unknown key, 'hal', nearest is 'hall'" in neither
-    assert "robots.base.model: a robot of a hall in a world without one, 'station'" in neither
     rover = "{model: rover, x: 0 m, y: 0 m, sensors: {}}"
     assert "robots.camera.model: a robot of a hall in a world without one, 'rover'" in problems(
         TABLE, f"robots.camera={rover}"

@@ -281,5 +281,5 @@ def test_an_array_that_is_none_of_all_drives_names_them() -> None:
     ((_, _, together),) = moving.groups
     together._asked = together._asked[1:]
     yard.stepper.world._moving = moving
-    with pytest.raises(ComponentError, match="actuators of the motion differential_drive failed at tick 0"):
+    with pytest.raises(ComponentError, match="actuators of the motion WheeledMotion failed at tick 0"):
         yard.step()

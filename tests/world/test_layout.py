@@ -156,7 +156,7 @@ def test_every_difference_has_another_digest() -> None:
         LAYOUT,
         build_layout(with_spares(0)),
         build_layout(with_spares(1)),
-        Layout({**LAYOUT.models, "red.goal": "camera"}, LAYOUT.declared),
+        Layout({**LAYOUT.models, "red.goal": "camera"}, replace(LAYOUT.declared, kinds={})),
         *(
             Layout(LAYOUT.models, replace(LAYOUT.declared, carried={**LAYOUT.declared.carried, "red.goal": other}))
             for other in others
