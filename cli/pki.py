@@ -1,4 +1,4 @@
-"""The command `foosim pki`: certificates for those who take part in a run, control it or connect to it."""
+"""The command `foosim pki`: certificates of the processes and clients of a run."""
 
 from __future__ import annotations
 

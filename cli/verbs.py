@@ -77,7 +77,7 @@ class Verbs(Group):
 
 
 def summary(name: str, where: str) -> str:
-    """Return the first paragraph of a verb's help, from the source of its module, which is not imported."""
+    """Return the first paragraph of a verb's help, from the source of its module, without importing it."""
     spec = find_spec(f"foosim.{where.partition(':')[0]}")
     assert spec is not None and spec.origin is not None, where
     found: dict[str, str | None] = {}

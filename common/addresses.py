@@ -74,7 +74,7 @@ def parse_address(text: str, secured: bool | None = None) -> Address:
 
 
 def _in_brackets(text: str) -> str | None:
-    """Return a bare IPv6 address as it is written here; None for what is none."""
+    """Return a bare IPv6 address in the brackets that it needs; None for any other text."""
     protocol, slash, host = text.rpartition("/")
     try:
         return repr(f"{protocol}{slash}[{IPv6Address(host)}]")

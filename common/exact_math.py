@@ -4,7 +4,7 @@ The last bits of `math` and numpy depend on the machine, on the version and on t
 frame takes these functions instead; their bits never change. `foosim.common.batched.exact_arrays` has each of them for
 arrays: the same operations in the same order, with the constants of this module, hence the same bits.
 
-Angles are in rad. No argument raises: what is too large is `inf`, and what has no value is `nan`, always the same one,
+Angles are in rad. No argument raises: an overflow is `inf`, and an undefined value is `nan`, always the same one,
 since processors make NaNs of different signs. Zeros keep their signs as in Annex F of C99. Square roots come from
 `math.sqrt` and `numpy.sqrt`, which IEEE 754 defines to the last bit.
 

@@ -11,7 +11,7 @@ PROTOCOL_VERSION: Final = 4
 NAME_LENGTH_MAX: Final = 32
 ENTITIES_MAX: Final = 4096
 FORMS_MAX: Final = 256
-"""Forms of a world that are not foosim's own."""
+"""Forms of a world from other packages."""
 FORM_NAME_MAX: Final = 400
 """Characters of a form with its module and class, and of its version."""
 NODES_MAX: Final = 256

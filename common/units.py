@@ -24,7 +24,7 @@ from foosim.common.names import nearest_name
 
 NS_PER_S: Final = 1_000_000_000
 NUMBERS_KEPT: Final = 4_096
-"""Quantities that are not read again: the robots of a fleet have most of theirs in common."""
+"""Cached quantities: the robots of a fleet have most of theirs in common."""
 
 _NUMBER: Final = r"[+-]?[0-9]{1,20}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
 _RATIO: Final = r"[0-9]{1,20}/[1-9][0-9]{0,19}"
@@ -130,7 +130,7 @@ def parse(text: object, dimension: Dimension) -> Fraction:
 
 
 def _other_dimension(unit: str, dimension: Dimension) -> Dimension | None:
-    """What a unit of another kind measures; the base unit tells kinds apart, so that MHz is one of a rate, too."""
+    """Return the dimension of a foreign unit. Dimensions are equal by their base unit, so MHz is one of a rate, too."""
     others = [other for other in globals().values() if isinstance(other, Dimension) and unit in other.units]
     return next((other for other in others if other.base not in dimension.units), None)
 
@@ -146,7 +146,7 @@ def parse_ns(text: object) -> int:
     """A time (`20s`, `2 ms`) in integer nanoseconds, at least 0; raises BadValue."""
     value = parse(text, TIME)
     if value < 0:
-        raise BadValue("a time that is not negative is needed", text)
+        raise BadValue("negative; a time is at least 0", text)
     if value.denominator != 1:
         raise BadValue("not a whole number of ns", text)
     return int(value)
@@ -237,7 +237,7 @@ class Quantity:
     high: str
 
     def read(self, value: object) -> float | int | Fraction:
-        """Return the number; raises pydantic's error for a value that is no such quantity or out of bounds."""
+        """Return the number; raises pydantic's error for another quantity and for a value out of bounds."""
         return _number_of(self, value) if type(value) is str else self._number(value)
 
     def _number(self, value: object) -> float | int | Fraction:

@@ -1,4 +1,4 @@
-"""The deployment: everything that a run is made from, as one frozen value.
+"""The deployment: all settings of a run, as one frozen value.
 
 This is the schema. Text becomes a `Deployment` in loader.py only, because what one field cannot know (every robot has
 one owner, every selector matches an endpoint, every rate is a whole number of ticks) is checked there too, by
@@ -113,13 +113,13 @@ class Capture(SpecBase):
     bytes_max: Size | None = Field(default=None, alias="max_bytes")
     split_bytes: Size | None = Field(default=None, alias="split_size")
     split_ns: Span | None = Field(default=None, alias="split_time")
-    """Another file is begun, with the next captured frame, when one has so many bytes, or so much simulated time."""
+    """A file ends at this size or simulated time; the next one begins with the next captured frame."""
     last_ns: Span | None = Field(default=None, alias="last")
-    """Of a capture that is split, files are removed that hold nothing of so much simulated time."""
+    """Files of a split capture are removed when all that they hold is older than this simulated time."""
 
     @property
     def is_split(self) -> bool:
-        """Whether the capture goes on in further files."""
+        """Whether the capture continues in further files."""
         return self.split_bytes is not None or self.split_ns is not None
 
 
@@ -197,7 +197,7 @@ class Deployment(WorldSpec):
         return named | self.digests | mesh_files(self.scenery) | network_files(self.network)
 
     def wanted(self, files: Mapping[str, bytes]) -> list[str]:
-        """The files that are needed beside `files`, as far as these tell: one may name further ones."""
+        """Return the needed files that `files` lacks, as far as known: one may name further ones."""
         needed = [*mesh_files(self.scenery), *network_files(self.network), *self.robot_files(files)]
         return [path for path in dict.fromkeys(needed) if path not in files]
 

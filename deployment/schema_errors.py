@@ -136,7 +136,7 @@ def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
 def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
     choices = schema.get("enum", [schema.get("const")])
     finding = _not_a_choice(location, value, [str(choice) for choice in choices])
-    # A choice that is no text is not written in quotes.
+    # Only a text is written in quotes.
     return finding if isinstance(choices[0], str) else replace(finding, nearest=None)
 
 

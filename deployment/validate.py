@@ -198,7 +198,7 @@ def _players(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 def _hears(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """A player's `hears`: selectors that match another endpoint, channels that one of these has."""
     robots = deployment.robots
-    said: dict[str, set[str]] = {}
+    channels_of: dict[str, set[str]] = {}
     for player, about in deployment.players.items():
         for glob, channels in about.hears.items():
             location: Location = ("players", player, "hears", glob)
@@ -207,11 +207,11 @@ def _hears(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                 nearest = ends.nearest(glob, [name for name in ends.names if name != player])
                 yield Finding(location, "a selector that matches no other endpoint", nearest=nearest, at="key")
                 continue
-            if glob not in said:
-                said[glob] = {channel for name in matched if name in robots for channel in robots[name].sensors}
+            if glob not in channels_of:
+                channels_of[glob] = {channel for name in matched if name in robots for channel in robots[name].sensors}
             if any(name not in robots and name != player for name in matched):
                 continue
-            valid = {*said[glob], names.CHANNEL_ECHO}
+            valid = {*channels_of[glob], names.CHANNEL_ECHO}
             for index, channel in enumerate(channels):
                 if channel not in valid:
                     nearest = ends.nearest(channel, valid)
@@ -280,7 +280,7 @@ def _acting(deployment: Deployment) -> Iterator[Finding]:
         for name, about in getattr(deployment, section).items():
             if not about.lockstep:
                 if "offset_ns" in about.model_fields_set:
-                    what = "an offset of who is not in lockstep: a free-running client has no ticks of its own"
+                    what = "offset without lockstep: a free-running client has no ticks of its own"
                     yield Finding((section, name, "offset"), what, at="key")
             elif about.rate_hz is None:
                 yield Finding((section, name, "rate"), "missing key of a client in lockstep", at="missing")
@@ -337,11 +337,11 @@ def _arrivals(deployment: Deployment, ends: Names, at: Location, player: Player,
         yield Finding((*at, "arrivals"), "missing key of a player that acts at arrival", at="missing")
     for glob, channels in arrivals.items():
         key = str(hears), glob
-        said = known.get(key)
-        if said is None:  # players that are like a template hear the same
-            said = known[key] = _said(deployment, ends, hears, glob)
+        sources_of = known.get(key)
+        if sources_of is None:  # players of one template hear the same
+            sources_of = known[key] = _sources_of(deployment, ends, hears, glob)
         heard = {name for robot, own in player.robots.items() if fnmatchcase(robot, glob) for name in own}
-        heard |= {channel for channel, sources in said.items() if any(source != at[-1] for source in sources)}
+        heard |= {channel for channel, sources in sources_of.items() if any(source != at[-1] for source in sources)}
         if not heard:
             others = (name for each in hears for name in ends.matched(each) if name != at[-1])
             nearest = ends.nearest(glob, chain(player.robots, others))
@@ -354,9 +354,11 @@ def _arrivals(deployment: Deployment, ends: Names, at: Location, player: Player,
                 yield Finding((*at, "arrivals", glob, index), what)
 
 
-def _said(deployment: Deployment, ends: Names, hears: Mapping[str, Sequence[str]], glob: str) -> dict[str, list[str]]:
-    """The channels to which `hears` subscribes of endpoints that a selector matches, each with two of these."""
-    said: dict[str, list[str]] = {}
+def _sources_of(
+    deployment: Deployment, ends: Names, hears: Mapping[str, Sequence[str]], glob: str
+) -> dict[str, list[str]]:
+    """Return the channels that `hears` takes of the endpoints of a selector, each with up to two of these."""
+    found: dict[str, list[str]] = {}
     matched = {*ends.matched(glob)}
     for selector, channels in hears.items():
         for source in ends.matched(selector) if channels else ():
@@ -365,9 +367,9 @@ def _said(deployment: Deployment, ends: Names, hears: Mapping[str, Sequence[str]
             robot = deployment.robots.get(source)
             own = channels if robot is None else (*robot.sensors, names.CHANNEL_ECHO)
             for channel in channels:
-                if channel in own and len(sources := said.setdefault(channel, [])) < 2 and source not in sources:
+                if channel in own and len(sources := found.setdefault(channel, [])) < 2 and source not in sources:
                     sources.append(source)
-    return {channel: sources for channel, sources in said.items() if sources}
+    return {channel: sources for channel, sources in found.items() if sources}
 
 
 # --- kits and scenery -------------------------------------------------------------------------------------------------
@@ -444,7 +446,7 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
     try:
         model = registry.find_model(name)
     except BadValue as error:
-        yield f"is of a model that is not there: {error}"
+        yield f"is of an unknown model: {error}"
         return
     if model.is_robot:
         yield f"is of the model {model.name}, which is one of robots: these have owners, and are in robots:"
@@ -499,11 +501,11 @@ def _radio(radio: RadioMaterial, location: Location) -> Iterator[Finding]:
         yield Finding((*location, "is"), "missing key of a material, unless it has a loss", at="missing")
     for key, value in (("is", radio.is_), ("thickness", radio.thickness_m)):
         if value is not None and radio.loss_db is not None:
-            yield Finding((*location, key), "a loss holds whatever it is made of: not beside one", at="key")
+            yield Finding((*location, key), "no effect beside loss, which holds for any material", at="key")
 
 
 def _open_meshes(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Meshes that are not closed, of a material of which it is not said how thick."""
+    """Yield open meshes of a material without a thickness."""
     for thing in deployment.open_meshes():
         radio = deployment.scenery[thing].radio
         material = "concrete" if radio is None or radio.is_ is None else radio.is_
@@ -517,8 +519,8 @@ def _open_meshes(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """Models, components and rules find in the world, and on their robot, what they need.
 
-    Nothing is known of robots whose state follows from files that are not there. What many robots share, by a template,
-    is checked once.
+    Robots whose state follows from missing files are passed over. What many robots share, by a template, is checked
+    once.
     """
     kits = deployment.kits
     met: set[tuple[int, int]] = set()
@@ -580,7 +582,7 @@ def _component_problems(form: ComponentType, model: Model, has: Mapping[str, int
     if missing:
         fitting = ", ".join(_having(needs))
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {_fields_of(model, missing, has)}")
-        yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
+        yield f"{word} that {with_article(model.name)} cannot carry, for lack of {', '.join(missing)} ({valid})"
     if isinstance(form, Component) and form.jobs and not model.is_solved:
         yield f"{word} whose jobs would never end: {with_article(model.name)} is neither rigid nor has a motion"
     if not isinstance(form, EntityRule):
@@ -619,7 +621,7 @@ def _trigger_of_model(sensor: Component) -> str:
 
 
 def _fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None) -> str:
-    """Return which fields a model has, and the one that is nearest to the first of those that it has not."""
+    """Return the fields of a model, and the nearest to the first missing one."""
     fields = [*(having or ())]
     shown = ", ".join(fields[:CHOICES_MAX]) + (", ..." if len(fields) > CHOICES_MAX else "")
     nearest = nearest_name(missing[0], fields)
@@ -673,7 +675,7 @@ def _unfit_component(
     for number, modifier in enumerate(settings.modifiers):
         place: Location = (*location, "modifiers", number)
         if numbers is None:
-            what = f"a modifier of what is not numbers alone: {component.type_name} {component.name}"
+            what = f"a modifier changes numbers alone, and this has others: {component.type_name} {component.name}"
             yield Finding((*place, "kind"), what, modifier.kind)
         else:
             yield from _unfit_modifier(modifier, Carrier(numbers.size, period_ns), numbers, place)
@@ -701,8 +703,8 @@ def _competing(actuators: Mapping[str, ActuatorSettings], location: Location) ->
 
 
 def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None) -> tuple[int, str] | None:
-    """Return the place of a joint among those that an actuator commands, and how another one commands it; None where
-    none is. None for joints are all that the robot has."""
+    """Return the index of a joint of an actuator that another one commands, and a description; None where there is
+    none. None for joints are all joints of the robot."""
     if named is None:
         what = "the motors that" if theirs is None else f"all joints, of which {theirs[0]} is one that"
         return 0, f"commands {what} {other} commands already"
@@ -746,7 +748,7 @@ def _unfit_modifier(
 
 
 def _value_of(error: BadValue, kind: str) -> object:
-    """Return the value that an error is about; that of a component is its kind where none is said."""
+    """Return the value of an error, or the kind of its component where it has none."""
     return kind if error.value is ABSENT else error.value
 
 
@@ -845,7 +847,7 @@ def _start(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield components whose settings their robots or the world do not fit: a joint that is not there, for one."""
+    """Yield components whose settings do not fit their robots or the world: an unknown joint, for one."""
     checked = [
         (name, section, channel, settings)
         for name, robot in spec.robots.items()
@@ -963,7 +965,7 @@ FILES: Final = ((Check("walls of meshes", _open_meshes),), (Check("what models a
 def stages(deployment: Deployment, *, with_files: bool = False) -> Iterator[tuple[Check, ...]]:
     """Yield the checks of a deployment by stages; each rests on those before, and is for one without problems in them.
 
-    `with_files` are those that files make possible which a deployment, loaded without problems, was given.
+    `with_files`: only the checks that need the contents of files, for a deployment that was loaded without problems.
     """
     if with_files:
         yield from (*FILES, *(STATE if deployment.asset_files else ()))

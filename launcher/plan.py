@@ -175,13 +175,13 @@ def default_capture(world: str, stamp: str) -> Path:
 
 
 def check_texts(*paths: Path | None) -> None:
-    """Raise BadValue for a path that is not UTF-8: files of the run, its messages and its capture have it as a text."""
+    """Raise BadValue for a path outside UTF-8: files of the run, its messages and its capture have it as a text."""
     for path in paths:
         text = "" if path is None else str(path.absolute())
         try:
             text.encode()
         except UnicodeEncodeError:
-            raise BadValue("a path that is not UTF-8", text) from None
+            raise BadValue("path is not valid UTF-8", text) from None
 
 
 def check_capture(path: Path) -> Path:

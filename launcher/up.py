@@ -239,7 +239,7 @@ class Up:
         return info if info is not None and info.radio else None
 
     def _await(self, ready: Callable[[], RunInfo | None]) -> RunInfo | None:
-        """Return the first value of `ready` that is not None; None when the run is over, or is to end, before."""
+        """Return the first value of `ready` besides None; None when the run is over, or is to end, before."""
         held_s = time.monotonic() + HELD_S
         while self._continues():
             if time.monotonic() > held_s:
@@ -384,7 +384,7 @@ class Up:
         return supervisor.name not in self._restarts.failed
 
     def _restart_ended(self, now_s: float, knows: bool = False) -> None:
-        """Restart processes that ended before the run did; give up those that fail repeatedly or are refused.
+        """Restart processes that ended before the run did; give up processes that fail repeatedly or are refused.
 
         `knows`: a new status has reported which nodes are stopped, and whether the run has begun.
         """
@@ -425,7 +425,7 @@ class Up:
         """Whether the run waits for a replacement of this process, which has ended.
 
         Before the first tick this holds for a process that something else has ended: one that failed reports why. A
-        player that is not to be restarted is included: it has not acted, so it loses no state.
+        player with `restart: false` is included: it has not acted, so it loses no state.
         """
         roles = self._roles(child.name)
         restarts = {kind.restart for kind in kinds_of(roles, self.plan.deployment)}
@@ -481,7 +481,7 @@ class Up:
         return (child.exit_code != DONE or child.left_early) and not self._comes_back(child)
 
     def _look_for_lost(self, now_s: float) -> None:
-        """Record the first child that ended unexpectedly; a killed one precedes those that ended because of it."""
+        """Record the first child that ended unexpectedly; a killed one precedes the others that ended for it."""
         if self._lost is None:
             bad = [
                 child
@@ -543,8 +543,8 @@ class Up:
             how = f"{name} {blamed.ending}{blamed.place}; its log is" if has_failed else f"the log of {name} is"
             return [f"{how} {blamed.log}"]
         reason = result["reason"]
-        is_said = child.ending in reason or child.name in self._restarts.failed
-        how = f"the log of {child.name} is" if is_said else f"{child.name} {child.ending}; its log is"
+        is_named = child.ending in reason or child.name in self._restarts.failed
+        how = f"the log of {child.name} is" if is_named else f"{child.name} {child.ending}; its log is"
         end = [f"    {line}" for line in child.last_lines() if not reason or reason not in line]
         return [f"{how} {child.log}", *end]
 

@@ -175,7 +175,7 @@ def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
     """
     opening = b""
     torn: tuple[int, Records] | None = None
-    """The first file of that opening that has no end, and its number."""
+    """The first file of that opening without an end, and its number."""
     for serial, path in _numbered(folder, stem):
         records = read_records(path)
         head = records.head

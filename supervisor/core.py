@@ -111,7 +111,7 @@ class SupervisorCore:
     # --- what the shell calls --------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message as it came; one that is not valid is counted and dropped."""
+        """Take one message as received; an invalid one is counted and dropped."""
         try:
             message = self.refusals.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))
@@ -156,7 +156,7 @@ class SupervisorCore:
         self.failover.wake(now_ns)
         self._balance(now_ns)
         if state.lacks_inputs and self._retry.is_over(now_ns):
-            self._ask_again(now_ns)
+            self._request_missing(now_ns)
 
     @property
     def lacking(self) -> tuple[Channel, int]:
@@ -368,8 +368,8 @@ class SupervisorCore:
         else:
             self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
 
-    def _ask_again(self, now_ns: int) -> None:
-        """Ask for what the next commit lacks, the wait doubling."""
+    def _request_missing(self, now_ns: int) -> None:
+        """Request the messages that the next commit lacks; the wait doubles."""
         state, tick = self.state, self.state.frame.tick
         wants: list[Want] = []
         if tick not in state.inputs.deliveries:

@@ -1,8 +1,8 @@
 """The process `foosim run`: the supervisor's core as the router of the simulation plane.
 
-It holds the run's folder: the run file has the run's addresses, the journal has what was decided, and at the end
-`result.json` has how it ended. Started again in the folder of a run that has not ended, it listens where it listened
-and continues from the journal.
+It holds the run's folder: the run file has the run's addresses, the journal its decisions, and `result.json` at the end
+its result. Started again in the folder of an unfinished run, it listens at the same addresses and continues from the
+journal.
 """
 
 from __future__ import annotations

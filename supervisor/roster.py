@@ -158,7 +158,7 @@ class Roster:
         return ""
 
     def missing(self) -> list[str]:
-        """Return the declared processes that are not ready yet."""
+        """Return the declared processes that are still to be ready."""
         here = {name for name, process in self.by_name.items() if not process.lost and process.ready}
         return [name for name in self.expected if name not in here]
 

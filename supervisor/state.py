@@ -26,16 +26,16 @@ from foosim.protocol.messages import Commit, Deliveries, End, Epoch, Part, Tempo
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.records import (
     ANSWERS_KEPT,
-    ASKED_KEPT,
     DISRUPTIONS_KEPT,
+    REQUESTS_KEPT,
     Account,
-    Asked,
     Checkpoint,
     Control,
     History,
     OrderedRecord,
     Recovered,
     RecoveredRecord,
+    RequestSummary,
     RunRecord,
     disruptions_of,
 )
@@ -49,7 +49,7 @@ from foosim.world.setting.scheduled import Schedule
 
 
 class InputBuffer:
-    """Parts of nodes and deliveries of the vHub for ticks that are not committed."""
+    """Parts of nodes and deliveries of the vHub for uncommitted ticks."""
 
     def __init__(self) -> None:
         self.parts: dict[int, list[Part]] = {}
@@ -161,10 +161,10 @@ class RunState:
         self.commits: dict[int, bytes] = {}
         """The last ones, as they were published."""
         self.coming_edits: dict[int, list[Edit]] = {}
-        """Edits of ticks that are not released yet."""
+        """Edits of unreleased ticks."""
         self.answers = KeptAnswers(ANSWERS_KEPT)
         """By sender and id of the request."""
-        self.asked: deque[Asked] = deque(maxlen=ASKED_KEPT)
+        self.last_requests: deque[RequestSummary] = deque(maxlen=REQUESTS_KEPT)
         """The last requests that change something, for people."""
         self.last_disruptions: deque[tuple[int, str]] = deque(maxlen=DISRUPTIONS_KEPT)
         """The last of them: the tick at which each takes effect, the event as JSON."""
@@ -267,7 +267,7 @@ class RunState:
         return {name: node for name, node in self.owners.items() if not frame.layout[name].is_absent(frame.numbers)}
 
     def order(self, tick: int, edits: list[Edit]) -> None:
-        """Add edits of the supervisor's own to the order of a tick that is not committed.
+        """Add edits of the supervisor's own to the order of an uncommitted tick.
 
         The epoch that follows publishes again the orders that were released.
         """
@@ -339,12 +339,12 @@ class RunState:
             self.committed_ns,
             self.end,
             list(self.last_disruptions),
-            list(self.asked),
+            list(self.last_requests),
         )
         return encode(checkpoint)
 
     def restore(self, history: History) -> None:
-        """Put the state of a run that has not begun where a journal ends, before an epoch."""
+        """Restore the state at the end of a journal, before an epoch."""
         self.frame, self.chain = history.frame, history.chain
         self.released = self.frame.tick
         self.inputs.reset(self.frame.tick)
@@ -360,7 +360,7 @@ class RunState:
         self.roster.stopped, self.roster.starts = set(control.stopped), dict(control.starts)
         self.recovered, self.returns = history.recovered, dict(control.returns)
         self.restore_requests(history)
-        self.asked.extend(history.asked)
+        self.last_requests.extend(history.requests)
 
     def restore_requests(self, history: History) -> None:
         """Restore the effects of requests, and the last answers."""

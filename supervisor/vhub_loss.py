@@ -42,7 +42,7 @@ class VhubLoss:
         if state.is_vhub_away:
             return
         self._since_ns, self._reason, self._lost_at = now_ns, reason, (state.epoch, state.frame.tick)
-        if not state.is_open:  # the run waits for it as for any process that has not come yet
+        if not state.is_open:  # the run waits for it as for any missing process
             state.log("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
             return
         heartbeat = None if process is None else process.heartbeat
@@ -57,8 +57,8 @@ class VhubLoss:
     def on_heartbeat(self, process: Process, now_ns: int) -> None:
         """A lost vHub sends a heartbeat: it is back, unless that predates its loss or its tick does not advance."""
         state, heartbeat = self._state, process.heartbeat
-        goes_on = self._tick < 0 or (heartbeat is not None and heartbeat.tick > self._tick)
-        if state.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + IN_FLIGHT_NS:
+        advances = self._tick < 0 or (heartbeat is not None and heartbeat.tick > self._tick)
+        if state.end is None and advances and now_ns > max(self._since_ns, process.gone_ns) + IN_FLIGHT_NS:
             process.lost = False
             if state.is_open:  # else it repeats that it is ready, until it gets an epoch
                 self.on_ready(now_ns)
@@ -119,7 +119,7 @@ class PlayerLosses:
         self._open: list[tuple[Recovered, int]] = []
 
     def on_report(self, hub: Process) -> None:
-        """Add the new entries of a vHub's report; those that the journal has are not new."""
+        """Add the entries of a vHub's report that the journal lacks."""
         state, absences = self._state, hub.report.get("absences")
         if absences is None or not state.is_open or state.end is not None:
             return

@@ -160,7 +160,7 @@ class Viewing:
             chosen("endpoint", name, ends)
 
     def _reading(self, robot: str, channel: str) -> None:
-        """Raise Refused for a channel that is no sensor of the robot."""
+        """Raise Refused for a channel other than the robot's sensors."""
         robots = self._state.deployment.robots
         sensors = robots[chosen("robot", robot, sorted(robots))].sensors
         chosen(f"sensor of {robot}", channel, sorted(sensors))

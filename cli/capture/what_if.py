@@ -78,7 +78,7 @@ def what_if(
 
 
 def _deployment(capture: CaptureData, network: Path | None, settings: list[str]) -> Deployment:
-    """Return the capture's deployment with what is asked for; its world stays."""
+    """Return the capture's deployment with other settings of its network; its world stays."""
     for setting in settings:
         if not setting.startswith("network.") and not (setting.startswith("scenery.") and ".radio" in setting):
             problem = "not a setting of the network: network.KEY=VALUE, or scenery.NAME.radio=MATERIAL"

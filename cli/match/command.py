@@ -39,7 +39,7 @@ app = new_app()
 
 @dataclass(frozen=True, slots=True)
 class MatchOptions:
-    """What a match is asked for; each field is an argument or option of the command."""
+    """The settings of a match; each field is an argument or option of the command."""
 
     a: Annotated[str, typer.Argument(metavar="A", help="keeper, passive, striker, team, or module:Class.")]
     b: Annotated[str, typer.Argument(metavar="B", help="The other player, likewise.")]
@@ -96,7 +96,7 @@ def foosim_match(
 
 
 def _checked(options: MatchOptions) -> Match:
-    """Return the match that was asked for; raises Refused. Nothing has been played, and no file made."""
+    """Return the match of the options; raises Refused, before any game and any file."""
     drawing, name = options.drawing, str(options.deployment)
     if drawing is not None:
         if options.delay is None and options.loss is None:

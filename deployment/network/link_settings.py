@@ -76,7 +76,7 @@ class Profiles:
         yield None
 
     def _rules(self, source: str, destination: str) -> Sequence[LinkRule]:
-        """Return the rules that may be those of a pair: of the console's links those that name it."""
+        """Return the rules that may apply to a pair; to the console's links only rules with its name apply."""
         if self.console not in (source, destination):
             return self.network.links
         return [rule for rule in self.network.links if self.console in rule.selectors]
@@ -144,7 +144,7 @@ class Profiles:
 
 
 def over(base: Radio, changes: LinkRule | Impairments) -> Radio:
-    """Return a radio's settings with those that a rule writes; a model of bursts replaces another one."""
+    """Return a radio's settings with the rule's over them; a rule's model of bursts replaces the radio's."""
     written = {key: getattr(changes, key) for key in changes.model_fields_set if key in LinkSettings.model_fields}
     if any(key in written for key in BURSTS):
         written = dict.fromkeys(BURSTS) | written

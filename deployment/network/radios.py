@@ -77,7 +77,7 @@ class Fading(SpecBase):
 
 
 class RadioKeys(LinkSettings):
-    """Everything that can be said of a radio."""
+    """All settings of a radio."""
 
     medium: Literal["none", "wired", "radio", "wifi", "ieee802154", "lora", "lte"] = "none"
     air: Name | None = None
@@ -128,7 +128,7 @@ LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)
 
 
 def lora_longest(factor: object) -> int | None:
-    """Return the longest payload of a spreading factor, in bytes; None for what is none."""
+    """Return the longest payload of a spreading factor, in bytes; None for an unknown factor."""
     is_factor = isinstance(factor, int) and 7 <= factor <= 12
     return LORA_LONGEST[factor - 7] if isinstance(factor, int) and is_factor else None
 

@@ -26,7 +26,7 @@ EVENTS_MAX: Final = 4096
 SELECTORS_MAX: Final = 16
 """Selectors on one side of a link rule."""
 REST: Final = "rest"
-"""In a partition: everybody whom no other group selects."""
+"""In a partition: all endpoints outside the other groups."""
 
 Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
 Moment = Annotated[int, Quantity(units.TIME, "0 s", "10000 h")]
@@ -118,7 +118,7 @@ class Clog(SpecBase):
 
 
 class Change(Impairments):
-    """New settings of one link rule; what is not written stays."""
+    """New settings of one link rule; other settings stay."""
 
     link: Name
 

@@ -41,7 +41,7 @@ def radio_text(radio: Radio) -> str:
 
 
 def _differing(content: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries that are not those of `base`, of mappings that both have the differing ones alone."""
+    """Return the entries that differ from those of `base`, recursively where both are mappings."""
     found = {}
     for name, value in content.items():
         other = base.get(name)

@@ -4,7 +4,7 @@ Abbreviations are templates (`like`), fleets (`count`), entries for each robot (
 selectors in the place of robots' names: in the lists of nodes, where `rest` is whatever no other entry names, and as
 keys of a player's robots.
 The expanded tree has the places of what was written. It shares the nodes that several entries have in common, so that
-nobody changes it. Everything else in the tree is passed on as it is, wrong or not.
+it is never changed. Everything else in the tree is passed on as it is, wrong or not.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ ENTRIES: Final = (*FLEETS, *FOR_ROBOTS)
 class Expanded:
     """An expanded tree, None where a problem leaves none, and the problems.
 
-    What else is wrong with `broken` entries (section and name) follows from a problem. `unused` templates are of
-    nobody's, whole, with the places of their names.
+    Further errors in `broken` entries (section and name) follow from a problem. `unused` templates are whole, with the
+    places of their names.
     """
 
     tree: Tree | None
@@ -79,7 +79,7 @@ def _example(template: Fields) -> Fields:
 
 
 class Expansion:
-    """The expansion of one tree, part by part: each is computed when it is asked for. Methods raise Stopped."""
+    """The expansion of one tree, part by part: each is computed at its first use. Methods raise Stopped."""
 
     def __init__(self, tree: Fields, report: Report) -> None:
         self._tree = tree
@@ -105,7 +105,7 @@ class Expansion:
         return whole
 
     def section(self, name: str) -> Tree | None:
-        """Return one section, expanded; of templates those that are not wrong. None where there is none."""
+        """Return one section, expanded, without invalid templates; None for an absent section."""
         section = self._tree.values.get(name)
         if not isinstance(section, Fields):
             return section

@@ -33,7 +33,7 @@ from foosim.world.scenery import path_problem
 
 INCLUDE: Final = "include"
 TREES_KEPT: Final = 16
-"""Files that are not read again when other settings are placed in them."""
+"""Cached trees of files, for the next read with other settings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A file that is to be included, and where that is said."""
+    """A file to include, and the place of its include."""
 
     path: str
     place: Place
@@ -87,7 +87,7 @@ def read_source(source: str | Source, name: str) -> tuple[Tree | None, list[Prob
 
 
 def inlined(text: str, name: str, text_of: TextOf) -> tuple[Tree | None, list[Problem]]:
-    """Return the tree of a deployment's text with what it includes, as files are asked for; nobody changes it."""
+    """Return the tree of a deployment's text with its includes, read by `text_of`; it must not be changed."""
     tree, problems = _tree_of(text, name, 0)
     if not isinstance(tree, Fields) or INCLUDE not in tree.values:
         return tree, problems

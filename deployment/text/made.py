@@ -61,7 +61,7 @@ def counted(entry: Fields, path: tuple[str, str], count_max: int, report: Report
         spare = None
     if COUNT not in entry.values and spare is None:
         if SPACING in entry.values:
-            report.add(entry.keys[SPACING], path, "a spacing of what has no count", SPACING)
+            report.add(entry.keys[SPACING], path, "spacing without count", SPACING)
         return {}
     present, spares = (
         0 if node is None else _count(node, (*path, key), count_max, report)
@@ -84,7 +84,7 @@ def _count(node: Tree, path: Location, count_max: int, report: Report) -> int:
 
 
 def _spacing(node: Tree | None, path: Location, report: Report) -> dict[str, Step]:
-    """Return the steps by axis, without those, reported, that are none."""
+    """Return the steps by axis; invalid ones are reported and left out."""
     steps: dict[str, Step] = {}
     if not isinstance(node, Fields):
         if node is not None:
@@ -142,7 +142,7 @@ def _has_a_pose(entry: Fields) -> bool:
 
 
 def _further(text: Scalar, step: Step, steps: int) -> Scalar:
-    """Return a length that is some steps further, in its own unit; one that is none stays, for the schema."""
+    """Return a length increased by some steps, in its own unit; an invalid one stays, for the schema."""
     try:
         exact_m = units.parse(text, units.LENGTH) + steps * step.exact_m
     except BadValue:

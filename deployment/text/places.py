@@ -20,7 +20,7 @@ from foosim.deployment.text.templates import TEMPLATES
 from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree, plain
 
 FINDINGS_MAX: Final = 2_000
-"""Findings that are looked at, also of those that are the same problem: each may have thousands of names to compare."""
+"""Findings that are read, with repeated ones: each may have thousands of names to compare."""
 _AS_WRITTEN: Final = (TEMPLATES, "nodes")
 """Sections whose locations are those in the text: an index of a node's list has no meaning when it is expanded."""
 
@@ -60,7 +60,7 @@ class Places:
         return Problem(place, replace(finding, location=location).text)
 
     def distinct(self, findings: Iterable[Finding], broken: Collection[Location]) -> Iterator[Finding]:
-        """Yield the findings that are no other's problem, and not of broken entries; lazily, and so many at most."""
+        """Yield the findings without repeated ones and those of broken entries; lazily, from at most `FINDINGS_MAX`."""
         met: set[Key] = set()
         for number, finding in enumerate(findings):
             if number == FINDINGS_MAX:

@@ -29,7 +29,7 @@ def is_several(text: str) -> bool:
 
 
 class Selector:
-    """A glob, a range or a name, and what its wildcards match. Raises BadValue for a text that is none."""
+    """A glob, a range or a name, and what its wildcards match. Raises BadValue for an invalid text."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -55,7 +55,7 @@ class Selector:
         return self._pattern.groups
 
     def match(self, name: str) -> tuple[str, ...] | None:
-        """Return what the wildcards match, None for a name that is not selected."""
+        """Return the texts that the wildcards match, None for a name outside the selection."""
         found = self._pattern.fullmatch(name)
         if found is None:
             return None

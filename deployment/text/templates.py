@@ -25,7 +25,7 @@ TEMPLATES: Final = "templates"
 LIKE: Final = "like"
 PRESET: Final = "preset"
 OF_ENTRIES: Final = ("count", "spacing", "each")
-"""Keys that an entry has, and no template: how many there are is said where they are."""
+"""Keys of entries, invalid in templates: an entry has its own count."""
 
 
 def merged(base: Tree, own: Tree) -> Tree:
@@ -93,7 +93,7 @@ class Templates:
         return list(self._written)
 
     def applied(self, entry: Tree, path: tuple[str, str]) -> Tree:
-        """Return an entry of a section with what it is like. Where that cannot be said the entry is broken."""
+        """Return an entry of a section merged with its template. Without a valid template the entry is broken."""
         like = entry.values.get(LIKE) if isinstance(entry, Fields) else None
         if like is None or not isinstance(entry, Fields):
             return entry
@@ -104,7 +104,7 @@ class Templates:
         return merged(template, own)
 
     def whole(self, name: str, chain: tuple[str, ...] = ()) -> Fields | None:
-        """Return a template with what it is like; None, reported, where that cannot be said."""
+        """Return a template merged with its own template; None, reported, without a valid one."""
         if name not in self._whole:
             template = self._written[name]
             like = template.values.get(LIKE)

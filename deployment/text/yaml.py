@@ -40,7 +40,7 @@ _WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null")
 class Place:
     """A place in a file: line and column from 1, in characters.
 
-    `rank` orders files: the deployment's is 0, those that it includes follow, then settings of a command line.
+    `rank` orders files: the deployment's is 0, its includes follow, then settings of a command line.
     """
 
     rank: int
@@ -310,8 +310,7 @@ def write_yaml(data: Any) -> str:
 
 
 def _lines(data: dict[Any, Any] | list[Any], first: str, indent: str) -> Iterator[str]:
-    """Yield the lines of a collection that is not empty. `first` is what its first line begins with, `indent` what the
-    others do."""
+    """Yield the lines of a non-empty collection. `first` begins its first line, `indent` the others."""
     entries = enumerate(data) if isinstance(data, list) else data.items()
     for key, value in entries:
         begin = f"{first}-" if isinstance(data, list) else f"{first}{_scalar(key)}:"

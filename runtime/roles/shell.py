@@ -128,7 +128,7 @@ class Process:
     def run(self) -> int:
         """Run the roles until all are over; return the greatest of their exit codes. Raises Failed.
 
-        A role that is not done when it ends takes the others with it, but for the supervisor, which ends the run in
+        A role that ends unfinished ends the others too, except the supervisor, which ends the run in
         order. One that raises Failed at its end lets the others end.
         """
         failures: list[Failed] = []
@@ -195,7 +195,7 @@ def client_session(
     """Connect to the router of a plane at `connect`, with the certificate of `identity` where `pki` names a folder.
 
     `connect` is an address, or `run:NAME` for a run of this user on this machine, whose address is waited for.
-    `sets_runtime`: the first session of a process that is no router, which chooses Zenoh's client runtime.
+    `sets_runtime`: the first session of a process other than a router, which chooses Zenoh's client runtime.
     Raises NoRun, CertificateError, ConnectError after `CONNECT_S` or when `stop` is set.
     """
     credentials = load_credentials(pki, identity)

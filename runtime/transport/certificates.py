@@ -3,7 +3,7 @@
     ca.pem                   the root that all processes trust
     IDENTITY.pem .key        a certificate and its key; the certificate's common name is the identity
 
-A refused connection looks like a router that is not there, to both sides. So everything that can be checked here is
+A refused connection looks like a missing router, to both sides. So everything that can be checked here is
 checked before anything is opened. A process of a run without certificates, which most are, does not load what reads
 them.
 """
@@ -132,7 +132,7 @@ def warn_of_end(credentials: Credentials | None, log: logging.Logger) -> None:
 
 
 def check_host(credentials: Credentials | None, locator: str) -> None:
-    """Raise CertificateError when those who connect to where we listen would not find its host in our certificate."""
+    """Raise CertificateError when our certificate lacks the host of the address where we listen."""
     if credentials is None:
         return
     from foosim.runtime.transport.certificate_files import hosts_of, read_certificate

@@ -121,7 +121,7 @@ def refusals(run: Path, tmp_path: Path) -> Iterator[tuple[tuple[str | Path, ...]
     out = tmp_path / "o.mcap"
     yield (run, "--from", "10 s", "-o", out), "--from: the capture ends at 0.6 s, '10 s'"
     yield (run, "--from", "0.2", "-o", out), "--from: not a time"
-    yield (run, "--to", "-1 s", "-o", out), "--to: a time that is not negative is needed"
+    yield (run, "--to", "-1 s", "-o", out), "--to: negative; a time is at least 0"
     yield (run, "--from", "300 ms", "--to", "200 ms", "-o", out), "--to: before --from, which is 300 ms, '200 ms'"
     yield (run, "-o", run), "exists already; a capture is never overwritten"
     yield (run, "-o", run / "o.mcap"), "cannot be created, File exists"
