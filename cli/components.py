@@ -51,7 +51,7 @@ def chosen(form: str | None, name: str | None) -> list[ComponentType]:
 
 
 def as_json(component: ComponentType) -> dict[str, Any]:
-    """Return all that there is to know of one."""
+    """Return all properties of one."""
     slots = getattr(component, "slots", {})
     about: dict[str, Any] = {
         "type": component.type_name,
@@ -171,7 +171,7 @@ def _plain(value: Any) -> Any:
 
 
 def _settings(component: ComponentType) -> Iterator[tuple[str, str, str | None]]:
-    """Yield key, what is valid, and the default of each setting; None where it is required."""
+    """Yield key, valid values and default of each setting; None where it is required."""
     schema = component.settings.model_json_schema(by_alias=True)
     yield from _properties(schema, schema.get("$defs", {}), "")
 
@@ -179,7 +179,7 @@ def _settings(component: ComponentType) -> Iterator[tuple[str, str, str | None]]
 def _properties(
     schema: Mapping[str, Any], definitions: Mapping[str, Any], path: str
 ) -> Iterator[tuple[str, str, str | None]]:
-    """Yield the settings of a schema; of one that has settings of its own these, after its key and a point."""
+    """Yield the settings of a schema; nested settings follow the key of theirs and a point."""
     required = schema.get("required", ())
     for key, value in schema["properties"].items():
         found = _followed(value, definitions)
@@ -199,7 +199,7 @@ def _inner(value: Mapping[str, Any]) -> Any:
 
 
 def _followed(value: Any, definitions: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return what a schema refers to, and of one or nothing the one."""
+    """Return the schema without references, and without `or null`."""
     if not isinstance(value, dict):
         return {}
     if "$ref" in value:

@@ -111,7 +111,7 @@ def client(
 
 @app.command()
 def show(folder: Folder, json: JsonOption = False) -> None:
-    """Show whose certificates a folder has, until when, and what is wrong with them."""
+    """Show the certificates of a folder: their holders, ends and problems."""
     shown = pki.show_folder(folder)
     if json:
         print_json(

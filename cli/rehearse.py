@@ -183,7 +183,7 @@ def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> 
 
 @contextmanager
 def _noted_interrupts() -> Iterator[list[int]]:
-    """Give the interrupts so far: Python drops one that is raised while an object is destroyed."""
+    """Raise earlier interrupts: Python drops one that is raised while an object is destroyed."""
     noted: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:

@@ -51,7 +51,7 @@ class NotFinite(BadValue):
 
 
 def read_at(place: str, read: Callable[[str], Read], text: str) -> Read:
-    """Return `read` of a text; a BadValue that it raises names the place, such as an option."""
+    """Return `read(text)`; its BadValue gets the place, such as an option."""
     try:
         return read(text)
     except BadValue as bad:

@@ -83,7 +83,7 @@ FLIGHT_HEAD_BYTES: Final = 200
 RECOVERIES_PER_COMMIT_MAX: Final = 1_024
 """Losses and returns that a commit reports; the next one reports the rest."""
 HELD_MESSAGES_MAX: Final = 1024
-"""Messages that a node holds for an epoch that it does not know yet: parts of some ticks of all nodes."""
+"""Messages that a node holds for a coming epoch: parts of some ticks of all nodes."""
 KEPT_TICKS: Final = 16
 """Ticks of sent messages that each process keeps for repetition."""
 RELEASE_AHEAD: Final = 4

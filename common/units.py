@@ -1,4 +1,4 @@
-"""Quantities as people write them (`2 ms`, `0.5 %`, `84 mm`) and as the code computes with them.
+"""Quantities: their texts (`2 ms`, `0.5 %`, `84 mm`) and their numbers in the code.
 
 In a file every quantity is a string with its unit. In the code it is a float in SI units, except time, which is an
 integer count of nanoseconds, counts of ticks, which are integers, and rates, which are exact fractions of hertz.
@@ -46,7 +46,7 @@ class Dimension:
 
     @property
     def base(self) -> str:
-        """The unit whose size is 1: the one that values are shown in."""
+        """The unit whose size is 1, in which values are shown."""
         return next(unit for unit, size in self.units.items() if size == 1)
 
     @property
@@ -229,7 +229,7 @@ def parse_pace(text: object) -> Pace:
 class Quantity:
     """Annotation of a model's field: a string with a unit in the file, a number in the code, within bounds.
 
-    The bounds are written as in a file, so that messages show them as people write them.
+    The bounds are written as in a file, so that messages have the same texts.
     """
 
     dimension: Dimension

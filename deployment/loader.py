@@ -211,7 +211,7 @@ def load_network(text: Text, name: str, sets: Sequence[str] = ()) -> Network | N
 
 
 def check_complete(text: Text, name: str, deployment: Deployment) -> None:
-    """Refuse what is known of a deployment with its files: walls without a thickness, robots whose files do not give
+    """Refuse errors that need a deployment's files: walls without a thickness, robots whose files do not give
     what their components need, and what starts in a mesh.
 
     `text` and `name` are what the deployment was loaded from. Raises DeploymentError.

@@ -171,7 +171,7 @@ def _is_null(value: Tree) -> bool:
 
 @dataclass(slots=True)
 class _Taken:
-    """The way through a tree so far: what is there when templates and counts are expanded."""
+    """The path through a tree so far, in the tree with expanded templates and counts."""
 
     tree: Tree
     steps: list[str | int] = field(default_factory=list)

@@ -153,7 +153,7 @@ def _hosts(deployment: Deployment, ends: Names) -> Iterator[Finding]:
         if about.host is not None and about.host not in hosts:
             yield Finding((*role, "host"), "unknown host", nearest=ends.nearest(about.host, hosts))
         if about.label is not None and about.host is not None:
-            yield Finding((*role, "label"), "a label beside a host: one of them says where")
+            yield Finding((*role, "label"), "label beside host: only one of them is valid")
         elif about.label is not None and about.label not in labels:
             yield Finding((*role, "label"), "a label that no host has", nearest=ends.nearest(about.label, labels))
         if about.host is None and about.label is None and getattr(about, "launch", "") == "systemd":
@@ -234,9 +234,9 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
             yield Finding(("clients", name, "lockstep"), "the console is not in lockstep: the run would wait for it")
         if client.on is not None:
             yield Finding(("clients", name, "on"), "the console is on board of no robot")
-    for index, name in enumerate(deployment.access.viewers):  # who would receive each other's answers
+    for index, name in enumerate(deployment.access.viewers):  # both would receive each other's answers
         if name in deployment.access.operators:
-            yield Finding(("access", "viewers", index), "a viewer who is an operator, too")
+            yield Finding(("access", "viewers", index), "a viewer that is an operator, too")
     if deployment.capture.last_ns is not None and not deployment.capture.is_split:
         yield Finding(("capture", "last"), "whole files are let go: needs split_size or split_time")
     deadlines = deployment.deadlines
@@ -249,7 +249,7 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _times(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Sensors have any rate up to that of the ticks, rates and offsets of who acts in lockstep are whole ticks, offsets
+    """Sensors have any rate up to that of the ticks, rates and offsets of lockstep clients are whole ticks, offsets
     are below their periods, and the clocks of radios are less than a tick apart.
     """
     tick_ns, substeps = deployment.tick_ns, deployment.substeps
@@ -264,7 +264,7 @@ def _times(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     seen: set[int] = set()
     for robot, settings in deployment.robots.items():
         for channel, sensor in settings.sensors.items():
-            if id(sensor) not in seen:  # robots that are like a template share its sensors
+            if id(sensor) not in seen:  # robots of a template share its sensors
                 seen.add(id(sensor))
                 yield from _sensor(sensor, ("robots", robot, "sensors", channel), tick_ns)
     if "poses_hz" in deployment.capture.model_fields_set:
@@ -376,7 +376,7 @@ def _sources_of(
 
 
 def _kits(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Settings of a kit fit each other; what it brings into the world can be there, and has names of its own."""
+    """Settings of a kit fit each other; its entities and rules are valid, and have unique names."""
     kits = deployment.kit_types
     taken: dict[str, str] = {}
     for key, kit in kits.items():
@@ -405,7 +405,7 @@ def _kits(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _checked(kit: Kit, deployment: Deployment) -> list[Finding]:
-    """Return what a kit itself finds wrong with its section."""
+    """Return the kit's own findings about its section."""
     made: Any = kit.factory
     return [*made.check(deployment.kits[kit.name], deployment)]
 
@@ -423,7 +423,7 @@ def _called(found: ComponentType, what: str, function: Callable[..., Any], *argu
 
 
 def _spares(deployment: Deployment, kit: Kit) -> dict[str, str]:
-    """Return what a kit brings that is absent at the start, models by name. Raises BadValue."""
+    """Return the spares of a kit, models by name. Raises BadValue."""
     found: dict[str, str] = _called(kit, "spares", lambda: dict(spares_of(deployment, kit)))
     wrong = [name for name in found if not is_robot_name(name)]
     if wrong:
@@ -456,7 +456,7 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
 
 
 def _wrong_rule(data: Mapping[str, Any], kits: Collection[str]) -> Iterator[str]:
-    """Yield what is wrong with a rule that a kit brings, as plain data."""
+    """Yield the errors of a kit's rule, given as plain data."""
     try:
         rule = registry.find("rule", data["kind"])
         rule.settings.model_validate(dict(data))
@@ -488,7 +488,7 @@ def _scenery(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _models(deployment: Deployment) -> Iterator[Model]:
-    """Yield the models of robots and objects, and of what kits put into the world."""
+    """Yield the models of robots and objects, and of the kits' entities."""
     yield from (one.component_type for one in (*deployment.robots.values(), *deployment.objects.values()))
     for name in _brought(deployment).values():
         with suppress(Refused):  # reported with the kit
@@ -517,7 +517,7 @@ def _open_meshes(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Models, components and rules find in the world, and on their robot, what they need.
+    """The needs of models, components and rules are met by the world and their robot.
 
     Robots whose state follows from missing files are passed over. What many robots share, by a template, is checked
     once.
@@ -573,7 +573,7 @@ def _model_problems(model: Model, kits: Collection[str], has: Mapping[str, int] 
 
 
 def _component_problems(form: ComponentType, model: Model, has: Mapping[str, int] | None) -> Iterator[str]:
-    """Yield what a robot of a model does not have that a component or rule of it needs; `has` as above."""
+    """Yield the needs of a component or rule that a robot of a model does not meet; `has` as above."""
     word = word_of(form.type_name)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
     if isinstance(form, Component) and (field := _trigger_of_model(form)) and field not in needs:
@@ -719,7 +719,7 @@ def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None
 def _unfit_modifier(
     settings: ModifierSettings, carrier: Carrier, numbers: Numbers, place: Location
 ) -> Iterator[Finding]:
-    """Yield what is wrong with a modifier on these numbers."""
+    """Yield the errors of a modifier on these numbers."""
     component: Component = settings.component_type
     keys = {field.alias or name: name for name, field in component.settings.model_fields.items()}
     findings = []
@@ -790,7 +790,7 @@ def _doubles(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
 
 
 def _lasting_spares(spec: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield the spares that cannot be absent: only what has a place of its own, and is solved, comes and goes."""
+    """Yield the invalid spares: only a solved entity with its own place can be added and removed."""
     named: dict[str, Location] = {name: ("objects", name, "spare") for name, one in spec.objects.items() if one.spare}
     named |= {name: ("robots", name, "spare") for name, one in spec.robots.items() if one.spare}
     named |= {name: (kit.name,) for kit in spec.kit_types.values() for name in spares_of(spec, kit)}
@@ -822,7 +822,7 @@ def _unheard(spec: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _trial(deployment: Deployment, ends: Names) -> Iterable[Finding]:
-    """What a trial of forms of other packages finds; foosim's own are not tried."""
+    """Yield the findings of a trial of forms from other packages; foosim's own are not tried."""
     if not foreign_versions(deployment):
         return ()
     from foosim.world.assembly.trial import trial_findings  # brings numpy
@@ -871,7 +871,7 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 class _Rigid(NamedTuple):
-    """Where something rigid is declared, and what it is."""
+    """The locations of rigid entities, and their descriptions."""
 
     location: tuple[str, ...]
     what: str
@@ -923,7 +923,7 @@ def rigid_bodies(spec: Deployment) -> Iterator[_Rigid]:
 
 
 class Check(NamedTuple):
-    """A row of the table. A check is `of_entries` where it finds what is wrong with an entry by itself."""
+    """A row of the table. A check is `of_entries` where it reads each entry alone."""
 
     name: str
     find: Find

@@ -69,11 +69,11 @@ _OF_MEDIUM: Final = {
 PAIRS_MAX: Final = 200_000
 """Pairs of endpoints that are searched for settings without effect; further pairs are accepted."""
 _LIMITING: Final = {"rate_bps": "rate", "trace": "trace", "overhead_bytes": "overhead", "payload_max": "mtu"}
-"""Fields of a rule that not every medium heeds, and their keys."""
+"""Fields of a rule that some media ignore, and their keys."""
 SHOWN_MAX: Final = 20
 _UNDER: Final[Location] = ("network", "events", 0)
 Kind = tuple[tuple[int, ...], tuple[str, ...], bool]
-"""What rules and radios know of an endpoint: the selectors that match it, by number, the radios that it has, and
+"""The properties of an endpoint for rules and radios: the selectors that match it, by number, its radios, and
 whether it is the console."""
 
 
@@ -196,7 +196,7 @@ def _chain(location: Location, loss: Fraction, bad: Fraction, mean: float) -> It
     share = loss / bad
     least = 1 / (1 - max(Fraction(0), 2 - 1 / share) * bad)
     if mean < least:
-        what = f"so much loss comes in bursts of at least {float(least):.4g} packets"
+        what = f"this loss needs bursts of at least {float(least):.4g} packets"
         yield Finding((*location, "mean_burst"), what)
     elif bad < 1 and mean >= 1 / (1 - bad):
         what = f"with this bad_loss bursts are shorter than {float(1 / (1 - bad)):.4g} packets"
@@ -204,7 +204,7 @@ def _chain(location: Location, loss: Fraction, bad: Fraction, mean: float) -> It
 
 
 def _exact(share: float) -> Fraction:
-    """Return a number as it is written, in tenths."""
+    """Return the text of a number, in tenths."""
     return Fraction(str(share))
 
 
@@ -232,7 +232,7 @@ def event_findings(ends: Names, location: Location, event: Event, links: Sequenc
         yield Finding((*location, key), f"beside {actions[0]}: an event does one thing", at="key")
     lasting = [key for key, value in (("for", event.lasts), ("until", event.until_ns)) if value is not None]
     if len(lasting) > 1:
-        yield Finding((*location, "until"), "beside `for`: one of them says how long", at="key")
+        yield Finding((*location, "until"), "beside `for`: only one of them is valid", at="key")
     for key in lasting if actions[0] not in ("partition", "clog") else ():
         yield Finding((*location, key), f"{actions[0]} happens at once", at="key")
     for index, group in enumerate(event.partition or ()):
@@ -301,7 +301,7 @@ def _unknown_airtime(radio: Radio) -> str | None:
 
 
 def rule_findings(profiles: Profiles, ends: Sequence[str]) -> Iterator[Finding]:
-    """Return which settings of rules, and of events for them, the radios do not heed by which packets go.
+    """Return the settings of rules, and of events for them, that the radios of their packets ignore.
 
     `ends` are the endpoints, none where they are not known: then only a rule's `via` is known.
     """
@@ -313,14 +313,14 @@ def rule_findings(profiles: Profiles, ends: Sequence[str]) -> Iterator[Finding]:
 
 
 class _Ways:
-    """By which radios the packets of rules go. Of the endpoints, one pair of each kind is looked at."""
+    """The radios of the packets of rules. Of the endpoints, one pair of each kind is read."""
 
     def __init__(self, profiles: Profiles, ends: Sequence[str]) -> None:
         self._profiles = profiles
         self._ends = ends
 
     def changed(self, event: Event, location: Location) -> Iterator[Finding]:
-        """Yield which settings of an event the radios do not heed."""
+        """Yield the settings of an event that the radios ignore."""
         change = event.set
         rules = self._profiles.network.links
         rule = None if change is None else next((rule for rule in rules if rule.id == change.link), None)
@@ -364,7 +364,7 @@ class _Ways:
 
     @cached_property
     def _pairs(self) -> list[tuple[str, str]]:
-        """Directed pairs of endpoints, one for each two kinds; a pair on one body goes another way than one on two."""
+        """Directed pairs of endpoints, one for each two kinds; a pair on one body has another link than one on two."""
         kinds = _kinds(self._profiles, self._ends)
         apart = permutations(_representatives(self._profiles, kinds), 2)
         on_body: dict[str, list[str]] = {}
@@ -379,7 +379,7 @@ class _Ways:
 
 
 def _kinds(profiles: Profiles, ends: Sequence[str]) -> dict[str, Kind]:
-    """Return what rules and radios know of each endpoint: the selectors that match it, and its radios."""
+    """Return the properties of each endpoint for rules and radios: the selectors that match it, and its radios."""
     rules = profiles.network.links
     globs = sorted({glob for rule in rules for glob in rule.selectors})
     matches = [re.compile(translate(glob)).match for glob in globs]

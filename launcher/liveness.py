@@ -145,7 +145,7 @@ PROC: Final = Path("/proc")
 OBSERVED_EVERY_S: Final = 0.2
 """The shortest time between two observations of a process."""
 STARVED_S: Final = 5.0
-"""A process is starved if it lacked a processor for more than half of such a time."""
+"""A process is starved if it lacked a processor for more than half of this time."""
 WARNED_EVERY_S: Final = 30.0
 """The shortest time between two warnings."""
 

@@ -168,7 +168,7 @@ class Child:
 
     @property
     def ending(self) -> str:
-        """How it ended, for people."""
+        """Its end in words."""
         code = self.exit_code
         if code is None:
             return "is alive"

@@ -48,9 +48,9 @@ LEAVE_S: Final = 1.0
 AWAY_S: Final = 10.0
 """The same for other machines, whose process ends are noticed later."""
 HELD_S: Final = 5.0
-"""How long lines wait for the console's address while the run does not come up."""
+"""The time that lines wait for the console's address during a slow start of the run."""
 LOST_S: Final = 3.0
-"""Time for the supervisor to notice the end of a child; it does not know one that never sent a hello."""
+"""Time for the supervisor to notice the end of a child; it has no record of one without a hello."""
 HANGS_MAX: Final = 2
 """A process with supervisor and players that has hung so often is given up: a player would make it hang again."""
 ENDED: Final = ("ended", "failed")
@@ -416,7 +416,7 @@ class Up:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
             command: Sequence[str] = child.command
-            if VHUB in self._roles(name):  # with the address that clients know
+            if VHUB in self._roles(name):  # with the address that clients have
                 again, info = self.plan.processes[name], self.folder.info()
                 command = self._commands.of(again, info, self._launcher.remotes.get(name))
             self._launch(name, command)

@@ -167,7 +167,7 @@ class Hello(Message, frozen=True, tag="hello"):
 
 
 class Recall(Message, frozen=True):
-    """The supervisor of this `boot` does not know a member: a process that knows another supervisor sends its hello."""
+    """The supervisor of this `boot` misses a member: a process with another supervisor sends its hello."""
 
     boot: Name
 
@@ -232,7 +232,7 @@ class Tempo(Message, frozen=True):
 
 
 class End(Message, frozen=True):
-    """The run is over after `tick` ticks; `form` is the one that has raised, where that is why."""
+    """The run is over after `tick` ticks; `form` is the one whose error ended it, if any."""
 
     tick: Counter
     reason: Text

@@ -59,7 +59,7 @@ from foosim.world.frame import Frame, chain_next
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class SupervisorCore:
-    """The supervisor's state machine. `actions` is what the shell performs next."""
+    """The supervisor's state machine. The shell performs its `actions` next."""
 
     def __init__(
         self,
@@ -108,7 +108,7 @@ class SupervisorCore:
             self.failover.begin(history, now_ns)
         self.actions.append(Journal(encode(state.run_record) if history is None else state.checkpoint()))
 
-    # --- what the shell calls --------------------------------------------------------------------------------------
+    # --- calls of the shell ----------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
         """Take one message as received; an invalid one is counted and dropped."""
@@ -162,7 +162,7 @@ class SupervisorCore:
     def lacking(self) -> tuple[Channel, int]:
         """The channel, and how many messages of it, without which there is nothing to commit.
 
-        Commits wait for each other as long as nodes can continue without them, less a tick for what a commit takes.
+        Commits wait for each other as long as nodes can continue without them, less a tick for the time of a commit.
         """
         state = self.state
         inputs, tick = state.inputs, state.frame.tick
@@ -224,7 +224,7 @@ class SupervisorCore:
         self.finish(reason, failed=True, tick=tick)
 
     def stop(self) -> int:
-        """End the run in order and return after which tick: what is released, or one more when all of it is committed.
+        """End the run in order and return its last tick: the released one, or one more when that is committed.
 
         The last commit is marked as the last, so that the vHub does not close its tick: no other may be.
         """
@@ -450,7 +450,7 @@ class SupervisorCore:
             self.node_loss.join(process, now_ns)
 
     def _on_heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
-        """A process lives: a lost one may be back; send it again what it has missed."""
+        """A process lives: a lost one may be back; send it the missed messages again."""
         state, process = self.state, self.handshake.on_heartbeat(heartbeat, now_ns)
         if process is None:
             return

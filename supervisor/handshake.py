@@ -69,7 +69,7 @@ class Handshake:
         return process
 
     def on_heartbeat(self, heartbeat: Heartbeat, now_ns: int) -> Process | None:
-        """Note that a process lives, and what it reports; recall one that takes part and has not sent a hello to this
+        """Note that a process lives, and its report; recall one of the run that has not sent a hello to this
         supervisor. Return the process."""
         state = self._state
         process = state.roster.by_name.get(heartbeat.sender)

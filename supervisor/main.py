@@ -39,7 +39,7 @@ from foosim.supervisor.records import History, fold
 from foosim.supervisor.settings import RunSettings
 
 LOOK_NS: Final = 1_000_000_000
-"""How often the free space of the journal's disk is looked at."""
+"""The period of reading the free space of the journal's disk."""
 
 
 class JournalRoom:

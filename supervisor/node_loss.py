@@ -1,4 +1,4 @@
-"""Loss, stop and return of nodes: the epoch that follows, and who owns which robot in it.
+"""Loss, stop and return of nodes: the next epoch, and the owner of each robot in it.
 
 A run that loses a node continues from its last commit with a new epoch. The remaining members
 adopt the robots of the lost node and give them back when it returns. Without any node the run waits.

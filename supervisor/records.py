@@ -43,10 +43,10 @@ class Account:
     handovers: int = 0
     moves: int = 0
     solvers: dict[str, str] = field(default_factory=dict)
-    """Who solved each free body on the way to the last frame, by the body's name."""
+    """The solver of each free body for the last frame, by the body's name."""
 
     def count(self, solved: Iterable[str], solvers: dict[str, str]) -> None:
-        """Count a committed frame: the nodes that solved a body for it, and who solved each free body."""
+        """Count a committed frame: the nodes that solved a body for it, and the solver of each free body."""
         for name in solved:
             self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
         for name, solver in solvers.items():
@@ -214,7 +214,7 @@ class History:
 
     run: RunRecord
     frame: Frame
-    """The last committed one; that of the start while none is."""
+    """The last committed one, at first that of the start."""
     owners: dict[str, str]
     control: Control
     account: Account
@@ -238,12 +238,12 @@ class History:
 
 
 Solved = tuple[list[str], dict[str, str]]
-"""The nodes that solved a body on the way to a frame, and who solved each free body, by its name."""
+"""The nodes that solved a body for a frame, and the solver of each free body, by its name."""
 
 
 def solved_by(barrier: Barrier, layout: Layout, absent: Collection[int]) -> Solved:
-    """Return the nodes that solved a body on the way to a frame, and who solved each free body; `absent` has the
-    indices of absent entities."""
+    """Return the nodes that solved a body for a frame, and the solver of each free body; `absent` has the indices of
+    absent entities."""
     entities = layout.entities
     solving = [
         name

@@ -91,7 +91,7 @@ class Requests:
             self._reply(answer)
 
     def on_inquiry(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
-        """Answer a viewer, who may only read."""
+        """Answer a viewer, which may only read."""
         if inquiry.verb in READS:
             answer = self._decide(inquiry, now_ns)
             assert answer is not None, inquiry.verb
@@ -129,7 +129,7 @@ class Requests:
         return self._write(request.verb, answer, answer.tick, [], self._state.owners)
 
     def _write(self, verb: str, answer: Answer, tick: int, edits: list[Edit], owners: dict[str, str]) -> Answer:
-        """Journal an answer and what is added to the order of `tick`; keep it for when the request is repeated."""
+        """Journal an answer and its additions to the order of `tick`; keep it for a repeated request."""
         self._state.journal(RequestRecord(tick, edits, answer, self._state.control(), owners, verb))
         self._state.last_requests.append(summary_of(verb, answer))
         self._state.answers.keep(answer)
@@ -239,7 +239,7 @@ class Requests:
         return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
 
     def _set(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Set a field of an entity, whose numbers follow from the newest frame and what is ordered since."""
+        """Set a field of an entity, whose numbers follow from the newest frame and the orders since."""
         state, field = self._state, _name(arguments, "field")
         layout, numbers = state.frame.layout, state.coming_numbers()
         entity = layout[chosen("entity", _name(arguments, "name"), layout.names)]

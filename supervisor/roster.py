@@ -31,7 +31,7 @@ ROLES: Final[tuple[str, ...]] = ("node", "vhub")
 
 @dataclass
 class Process:
-    """One process that takes part."""
+    """One process of the run."""
 
     role: str
     name: str
@@ -62,7 +62,7 @@ class Roster:
         self.starts: dict[str, int] = {}
         """Number of start requests by node; a launcher that sees it grow starts the node's process."""
         self.hub_account: dict[str, Any] = {}
-        """The last report of a vHub that had its state: one that is started again has none before it has read it."""
+        """The last report of a vHub with its state: a restarted one has none before it has read it."""
         self._fingerprint = fingerprint
         self._simulation = b""
 
@@ -109,14 +109,14 @@ class Roster:
         return known is not None and is_other and now_ns - known.heard_ns > SILENT_NS
 
     def take(self, hello: Hello, now_ns: int) -> Process:
-        """Note a process whose hello was accepted; one that was lost begins anew."""
+        """Note a process whose hello was accepted; a lost one begins anew."""
         known = self.by_name.get(hello.name)
         if known is None or known.lost:
             known = self.by_name[hello.name] = Process(hello.role, hello.name, hello.boot, heard_ns=now_ns)
         return known
 
     def hear(self, process: Process, report: dict[str, Any]) -> None:
-        """Note what a process reports of itself."""
+        """Note the report of a process."""
         process.report = report
         if process.name == VHUB and "packets" in report:
             self.hub_account = report

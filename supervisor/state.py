@@ -77,7 +77,7 @@ class InputBuffer:
         return True
 
     def take_deliveries(self, deliveries: Deliveries, payload: bytes, committed: int) -> bool:
-        """Take deliveries as they came; False for a repeat. Raises Malformed for a tick too far ahead."""
+        """Take received deliveries; False for a repeat. Raises Malformed for a tick too far ahead."""
         if deliveries.tick in self.deliveries or deliveries.tick < committed:
             return False
         if deliveries.last > committed + limits.KEPT_TICKS:
@@ -109,7 +109,7 @@ class RunState:
     busy: float = 0.0
     """The share of its time in which the supervisor's loop does not sleep."""
     repeated: int = 0
-    """Messages that came twice, or of a process that does not take part any more."""
+    """Repeated messages, and messages of a former process."""
     epoch: int = 0
     epoch_payload: bytes = b""
     """The epoch as it was published."""
@@ -141,7 +141,7 @@ class RunState:
         """`boot` names this start of the supervisor, `clock` the monotonic clock of its times."""
         self.settings, self.boot, self.clock = settings, boot, clock
         self.actions: list[Action] = []
-        """What the shell performs next."""
+        """The next actions of the shell."""
         self.deployment = settings.load_deployment()
         self._events = Schedule(self.deployment)
         text = settings.deployment_name, settings.deployment_text
@@ -315,7 +315,7 @@ class RunState:
     # --- checkpoint, restore, catch up -------------------------------------------------------------------------------
 
     def control(self) -> Control:
-        """Return what people have set, for the journal."""
+        """Return the settings by requests, for the journal."""
         pacer, roster = self.pacer, self.roster
         people = sorted(roster.stopped), dict(self.returns), dict(roster.starts)
         return Control(str(pacer.pace), pacer.paused, pacer.granted, self.stop_at, *people, self.disruptions)

@@ -64,7 +64,7 @@ class VhubLoss:
                 self.on_ready(now_ns)
 
     def on_ready(self, now_ns: int) -> None:
-        """The vHub takes part: send it the epoch and the pace."""
+        """The vHub is ready: send it the epoch and the pace."""
         state = self._state
         state.publish_epoch()
         state.publish_tempo()
@@ -102,7 +102,7 @@ class VhubLoss:
 class PlayerLosses:
     """Adds to the account which players were away, as the vHub reports it.
 
-    Its heartbeats have the players that are away, and numbered what is over; a vHub that was started again reports from
+    Its heartbeats have the players that are away, and numbered past absences; a restarted vHub reports from
     its journal once more what the one before did.
     """
 

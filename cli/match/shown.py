@@ -16,7 +16,7 @@ from foosim.simulation.match.game import Entrant, Fixture, Game, Link, Played
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """A checked match: who plays, the games in their order, and how they are shown."""
+    """A checked match: its players, the games in their order, and the form of the output."""
 
     entrants: tuple[Entrant, Entrant]
     fixture: Fixture

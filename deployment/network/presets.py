@@ -1,4 +1,4 @@
-"""Presets of radios and wires: every value with where it comes from.
+"""Presets of radios and wires: every value with its source.
 
 The mark before a source says how far to trust it: [S] read in a standard's reference code or a project's source,
 [M] measured in a cited paper, [C] computed from such, [R] recalled from a standard that was not at hand: unverified,

@@ -68,7 +68,7 @@ def network_files(network: Network) -> dict[str, str | None]:
 
 
 def check_files(network: Network, files: Mapping[str, bytes]) -> None:
-    """Read the files of all links; raises AssetError for one that is missing, not the one meant or not acceptable."""
+    """Read the files of all links; raises AssetError for a missing or invalid one, and for another digest."""
     for place, setting in file_settings(network):
         content = files.get(setting.file)
         if content is None:

@@ -24,12 +24,12 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     LIKE: "the name of a template, whose keys apply where this entry has none",
     COUNT: "how many of these there are: NAME-1 to NAME-N",
     SPARE: "whether it is absent until it is added, or how many more of these are: the last ones",
-    SPACING: "how much further along x, y and z each of them stands than the one before",
+    SPACING: "the distance along x, y and z from each of them to the next",
     PRESET: "the name of a preset of the kit, whose keys apply where this section has none",
     EACH: "a selector of robots: there is one of these for each, and $robot is its name",
 }
 NUMBERED: Final = "-[1-9][0-9]*$"
-"""Ends the name of what a count may have made; an entry under such a name may hold what is different about it."""
+"""Ends the name of an entry of a count; the file may have an entry of that name with its own keys."""
 _OF_WHOLE: Final = ("required", "discriminator", "minProperties")
 """Keywords of whole entries alone."""
 _PARTIAL: Final = "Partial"
@@ -78,7 +78,7 @@ def file_schema(schema: Schema, presets: Mapping[str, Sequence[str]]) -> Schema:
 
 def _entries(section: str, pattern: str, entry: Schema, partly: Schema) -> Schema:
     """Return the schemas of a section's entries by the pattern of their names."""
-    if section in FOR_ROBOTS:  # any of them may say what is different about one that is made
+    if section in FOR_ROBOTS:  # each may have the own keys of a made entry
         return {pattern: partly, "[$]": partly}
     whole = {"if": {"required": [LIKE]}, "then": partly, "else": entry}
     return {f"^(?!.*{NUMBERED}){pattern[1:]}": whole, f"^(?=.*{NUMBERED}){pattern[1:]}": partly}

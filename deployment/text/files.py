@@ -51,7 +51,7 @@ def read_source_file(path: Path) -> Source:
 
 
 def read_deployment_text(path: Path) -> str:
-    """The text of a deployment file, bounded before it is read, without what it includes; raises DeploymentError."""
+    """Return the text of a deployment file, bounded before it is read, without its includes; raises DeploymentError."""
     try:
         with path.open("rb") as file:
             raw = file.read(limits.DEPLOYMENT_BYTES_MAX + 1)

@@ -69,7 +69,7 @@ def _tree_of(text: str, file: str, rank: int) -> tuple[Tree | None, list[Problem
 
 
 def read_source(source: str | Source, name: str) -> tuple[Tree | None, list[Problem]]:
-    """Return the tree of a text with what it includes, and all problems; None where anything is refused.
+    """Return the tree of a text with its includes, and all problems; None where anything is refused.
 
     `name` is the file's in messages. The tree is the caller's own.
     """
@@ -111,7 +111,7 @@ class _Inliner:
         self._nodes = measure(root)[1]
 
     def add(self, tree: Fields, chain: tuple[str, ...]) -> None:
-        """Add what a file includes, then its own sections. `chain` are the files that include one another up to it."""
+        """Add the includes of a file, then its own sections. `chain` are the files on the path of includes to it."""
         for wanted in self._wanted(tree):
             problem = self._problem(wanted, chain)
             if problem:

@@ -43,7 +43,7 @@ class Places:
             self._expanded = Fields(expanded.place, values, keys)
 
     def problem(self, finding: Finding, *, is_made: bool = False) -> Problem:
-        """Return the problem that a finding is. `is_made`: it is one of an entry as it is made, whatever made it."""
+        """Return the problem of a finding. `is_made`: it is of an entry as made, for any maker."""
         finding = with_written(finding, self._data)
         place, is_key, depth = self._find(finding)
         if finding.other is not None:
@@ -114,7 +114,7 @@ def _walk(node: Tree, location: Location) -> Iterator[tuple[Place, bool, Locatio
 
 
 def _nameless(finding: Finding) -> str:
-    """Return what a finding says, without the names of the entry that it is about, and of what that is for."""
+    """Return the text of a finding without the name of its entry and the name that this is for."""
     if finding.location[:1] == ("nodes",):
         return finding.what  # of each robot that a selector matches
     text = describe(finding.what, finding.value)

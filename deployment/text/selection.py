@@ -24,7 +24,7 @@ _SIGNS: Final = re.compile(r"[*?]")
 
 
 def is_several(text: str) -> bool:
-    """Whether a text that stands for names is no single one: a glob, or a range."""
+    """Whether a text stands for several names: a glob, or a range."""
     return len(text) <= SELECTOR_LENGTH_MAX and is_selector(text) and (bool(_SIGNS.search(text)) or ".." in text)
 
 
@@ -71,7 +71,7 @@ class Selector:
 def _glob(text: str) -> re.Pattern[str]:
     """Return the pattern of a glob.
 
-    What a * matches is as short as possible, and not tried again: a glob needs no more, and many of them do not take
+    A * matches as little as possible, without a second try: a glob needs no more, and many of them do not take
     exponential time.
     """
     first, *others = text.split("*")

@@ -50,7 +50,7 @@ def without(fields: Fields, *keys: str) -> Fields:
 
 
 class Templates:
-    """The templates of a deployment's tree. What is wrong with them goes into the report, once."""
+    """The templates of a deployment's tree. Their errors are reported once."""
 
     def __init__(self, tree: Fields, report: Report) -> None:
         self._report = report
@@ -146,7 +146,7 @@ class Templates:
 def with_preset(name: str, section: Tree, report: Report) -> Tree:
     """Return a section over the preset that it names, itself where it names none or is that of no kit with presets.
 
-    What comes from the preset has the place of its name. Of an unknown one, which is reported, the first stands in.
+    Values of the preset have the place of its name. An unknown preset is reported, and replaced by the first.
     """
     if not isinstance(section, Fields) or PRESET not in section.values:
         return section

@@ -22,7 +22,7 @@ DEPTH_MAX: Final = 16
 NODES_MAX: Final = 20_000
 NUMBER_LENGTH_MAX: Final = 40
 KEY_LENGTH_MAX: Final = 512
-"""Longer keys are written behind a question mark: readers look for a colon within 1,024 characters."""
+"""Longer keys are written after a question mark: readers search for a colon within 1,024 characters."""
 SETS_RANK: Final = 1_000
 """The rank of places in settings of a command line: files are before it."""
 
@@ -329,7 +329,7 @@ def _lines(data: dict[Any, Any] | list[Any], first: str, indent: str) -> Iterato
 
 
 def _scalar(value: Any) -> str:
-    """Return a scalar or an empty collection as it is written."""
+    """Return the text of a scalar or of an empty collection."""
     if isinstance(value, float):
         text = repr(value)
         return text if "." in text else text.replace("e", ".0e")  # a text in YAML 1.1 without a point

@@ -34,7 +34,7 @@ CONNECT_S: Final = UNKNOWN_NS / 1e9
 RUN: Final = "run:"
 """Before the name of a run, instead of an address."""
 LOOK_S: Final = 0.02
-"""How often a process looks for the address of its run."""
+"""The period of reading the address of its run."""
 
 
 class RoleShell:
@@ -78,7 +78,7 @@ class RoleShell:
         self._exposure = Exposure(parse_address(locator), time.monotonic_ns())
 
     def check(self, now_ns: int) -> None:
-        """Do what is due in each turn. Raises NotAuthorised when the router has not admitted this process in time."""
+        """Do the work of each turn. Raises NotAuthorised when the router has not admitted this process in time."""
         if self._admission is not None:
             self._admission.check(now_ns)
         if self._exposure is not None and (reminder := self._exposure.due(now_ns)):
@@ -95,7 +95,7 @@ class Runnable(Protocol):
         """Whether the role has nothing more to do."""
 
     def finish(self) -> int:
-        """Perform the last actions; return the role's exit code. Raises Failed with what is to be reported."""
+        """Perform the last actions; return the role's exit code. Raises Failed with the reason to report."""
 
     def leave(self) -> None:
         """Leave files as a kill would: the process ends before the role is over."""

@@ -152,7 +152,7 @@ class Publisher:
 
 
 class Session:
-    """One session of a process. Use it in `with`; what it declares lives as long as it does."""
+    """One session of a process. Use it in `with`; its declarations live as long as it does."""
 
     def __init__(self, session: zenoh.Session, locator: str, *, is_open_router: bool = False) -> None:
         self.locator: Final = locator

@@ -96,7 +96,7 @@ def test_verify_refuses_it_and_a_run_begins_with_its_frames(run: Path, part: Pat
     done = replay("verify", part)
     assert done.code == 2 and "a cut of run.mcap from tick 120 on" in done.err and "verify run.mcap" in done.err
     found = replay("verify", part, "--from-first-frame", "--nodes", "3")
-    assert found.out.startswith("equal: 80 ticks behind frame 120 simulated again on 3 nodes, digest of all ticks ")
+    assert found.out.startswith("equal: 80 ticks after frame 120 simulated again on 3 nodes, digest of all ticks ")
     assert found.out.rstrip().endswith(capture_info(part).chain)
     deployment = load_deployment(open_capture(run).about.deployment_text, "table.yaml")
     for at in ("240 ms", "0.33 s", "400 ms"):
