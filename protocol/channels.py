@@ -110,12 +110,7 @@ WANT: Final = _simulation(
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
 TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
 WATCHED: Final = _simulation(
-    "watched",
-    messages.Watched,
-    "supervisor",
-    "vhub",
-    "a change of what viewers watch, and an answer",
-    named=False,
+    "watched", messages.Watched, "supervisor", "vhub", "a change of what viewers watch, and an answer", named=False
 )
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")

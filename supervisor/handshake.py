@@ -69,8 +69,8 @@ class Handshake:
         return process
 
     def on_heartbeat(self, heartbeat: Heartbeat, now_ns: int) -> Process | None:
-        """Note that a process lives, and its report; recall one of the run that has not sent a hello to this
-        supervisor. Return the process."""
+        """Note that a process lives, and its report; recall one of the run without a hello to this supervisor. Return
+        the process."""
         state = self._state
         process = state.roster.by_name.get(heartbeat.sender)
         if process is None:

@@ -62,8 +62,8 @@ class Wire:
     def _receive_plane(self) -> None:
         """Let the reader of the process wait for all that others publish on the plane, once for all of its roles.
 
-        Nearly all messages to the plane's router are for the roles in its process. A thread for each channel costs another
-        wake-up a message.
+        Nearly all messages to the router of a plane are for roles of its process. A thread for each channel costs
+        another wake-up a message.
         """
         stem = _STEM[self.plane]
         if not self._inbox.has(stem):
