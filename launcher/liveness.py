@@ -127,11 +127,11 @@ class StalledWatch:
             now_s = times_s[name]
             known, since_s = before.get(name, (pid, now_s))
             self._lost[name] = pid, since_s if known == pid else now_s
-            took_part = last == pid and looks >= LOOKS_MIN
-            patience_s = self._start_s if not took_part else CUT_OFF_S if name in away else STALLED_S
-            if now_s >= self._lost[name][1] + patience_s:
+            was_member = last == pid and looks >= LOOKS_MIN
+            limit_s = self._start_s if not was_member else CUT_OFF_S if name in away else STALLED_S
+            if now_s >= self._lost[name][1] + limit_s:
                 why = f"the run had lost it{_reason(status, name)}"
-                killed[name] = f"{why}, and it did not come back within {patience_s:g} s"
+                killed[name] = f"{why}, and it did not come back within {limit_s:g} s"
         return killed
 
 

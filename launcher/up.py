@@ -311,7 +311,7 @@ class Up:
             )
         self._start_wanted(status["starts"])
         if not self._has_ended and not self._ending_s:
-            self._restart_ended(now_s, knows=True)
+            self._restart_ended(now_s, has_status=True)
         self._end_stalled(status)
 
     def _start_wanted(self, starts: dict[str, int]) -> None:
@@ -383,17 +383,17 @@ class Up:
         self._start_due(now_s)
         return supervisor.name not in self._restarts.failed
 
-    def _restart_ended(self, now_s: float, knows: bool = False) -> None:
+    def _restart_ended(self, now_s: float, has_status: bool = False) -> None:
         """Restart processes that ended before the run did; give up processes that fail repeatedly or are refused.
 
-        `knows`: a new status has reported which nodes are stopped, and whether the run has begun.
+        `has_status`: a new status has reported which nodes are stopped, and whether the run has begun.
         """
-        may_judge = self._has_begun or knows or self._control is None
-        for child in self._launcher.ended() if may_judge else ():
+        may_decide = self._has_begun or has_status or self._control is None
+        for child in self._launcher.ended() if may_decide else ():
             roles = self._roles(child.name)
             is_kept = SUPERVISOR in roles or self._stopped.intersection(roles) or self._restarts.is_known(child.name)
             has_left = child.exit_code == DONE and not child.left_early
-            may_be_stopped = child.exit_code == REFUSED and not knows  # since the last status
+            may_be_stopped = child.exit_code == REFUSED and not has_status  # since the last status
             if not (is_kept or has_left or may_be_stopped) and self._comes_back(child):
                 self._restart_later(child, now_s)
         self._start_due(now_s)
@@ -434,8 +434,8 @@ class Up:
         if "unless refused" in restarts and (child.exit_code == REFUSED or is_given_up):
             return False
         if not self._has_begun:
-            is_orphan = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
-            return (is_lost or is_orphan) and not is_given_up
+            has_timed_out = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
+            return (is_lost or has_timed_out) and not is_given_up
         if "after a signal" in restarts:  # a player that ends by itself has failed
             return is_lost and not is_given_up and all(player.restart for player in self._players(child.name))
         return roles != (SUPERVISOR,)  # of which `_supervisor_comes_back` decides

@@ -76,7 +76,7 @@ class SupervisorCore:
         self.refusals = Refusals(state.actions.append, lambda: state.deployment)
         self.progress, self.closing = ProgressMonitor(state, now_ns), ClosingMonitor(state)
         self.viewing = Viewing(state)
-        self.handshake = Handshake(state, self.process_gone)
+        self.handshake = Handshake(state, self.connection_closed)
         self.vhub_loss, self.player_losses = VhubLoss(state, self.progress), PlayerLosses(state)
         self.node_loss = NodeLoss(state, self.open_epoch, self.fail)
         ends = self.fail, self.publish_last_commit
@@ -183,16 +183,16 @@ class SupervisorCore:
                 deadline = min(deadline, release_ns)
         return deadline
 
-    def process_gone(self, name: str, now_ns: int) -> None:
+    def connection_closed(self, name: str, now_ns: int) -> None:
         """The connection of a process has closed."""
         state = self.state
         process = state.roster.by_name.get(name)
         if process is None:
             return
-        process.gone_ns = now_ns
+        process.closed_ns = now_ns
         is_certain = not self.progress.doubts(process, now_ns)
         if is_certain and not process.farewell and not process.lost and state.end is None:
-            self._lose({name: closed(now_ns - process.heard_ns)}, now_ns)
+            self._lose({name: closed(now_ns - process.last_message_ns)}, now_ns)
 
     def on_standstill(self, stood_ns: int, now_ns: int) -> None:
         """Extend the deadlines of other processes by a standstill of the supervisor's own loop."""

@@ -199,7 +199,7 @@ class SupervisorShell:
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if plane is Plane.SIMULATION and not is_alive:
-            self.core.process_gone(name, time.monotonic_ns())
+            self.core.connection_closed(name, time.monotonic_ns())
 
 
 def serve(

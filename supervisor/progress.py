@@ -65,7 +65,7 @@ class ProgressMonitor:
     def on_standstill(self, stood_ns: int, now_ns: int) -> None:
         """Extend the deadlines of other processes by a standstill of the supervisor's own loop."""
         for process in self._state.roster.by_name.values():
-            process.heard_ns = min(now_ns, process.heard_ns + stood_ns)
+            process.last_message_ns = min(now_ns, process.last_message_ns + stood_ns)
         self._begun_ns = min(now_ns, self._begun_ns + stood_ns)
         self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
         if stood_ns >= REPORTED_NS:
@@ -250,8 +250,8 @@ class ClosingMonitor:
         account = hub.report.get("recording"), hub.report.get("disk_progress")
         if account != self._account:
             self._account, self._progress_ns = account, now_ns
-        silent_ns = now_ns - max(hub.gone_ns, hub.heard_ns)
-        if hub.gone_ns and silent_ns > deadlines.heartbeat_ns and not hub.in_doubt:
+        silent_ns = now_ns - max(hub.closed_ns, hub.last_message_ns)
+        if hub.closed_ns and silent_ns > deadlines.heartbeat_ns and not hub.in_doubt:
             self._cut_off(hub, "its vHub ended before it was closed")
             return True
         if now_ns > max(self._progress_ns, self._ended_ns) + deadlines.close_ns:

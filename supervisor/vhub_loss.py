@@ -58,7 +58,7 @@ class VhubLoss:
         """A lost vHub sends a heartbeat: it is back, unless that predates its loss or its tick does not advance."""
         state, heartbeat = self._state, process.heartbeat
         advances = self._tick < 0 or (heartbeat is not None and heartbeat.tick > self._tick)
-        if state.end is None and advances and now_ns > max(self._since_ns, process.gone_ns) + IN_FLIGHT_NS:
+        if state.end is None and advances and now_ns > max(self._since_ns, process.closed_ns) + IN_FLIGHT_NS:
             process.lost = False
             if state.is_open:  # else it repeats that it is ready, until it gets an epoch
                 self.on_ready(now_ns)
@@ -110,7 +110,7 @@ class PlayerLosses:
         self._state = state
         self._boot = ""
         """The start of the vHub that has reported last."""
-        self._heard = 0
+        self._last_number = 0
         """The number of its last entry."""
         self._known: Counter[tuple[str, str, str, int]] = Counter()
         """The account when this supervisor first heard of this start of the vHub, which reports that once more."""
@@ -126,13 +126,13 @@ class PlayerLosses:
         if absences["boot"] != hub.boot:
             return  # a late report of a vHub before this one
         if hub.boot != self._boot:
-            self._boot, self._heard = hub.boot, 0
+            self._boot, self._last_number = hub.boot, 0
             self._known = Counter((entry.what, entry.name, entry.reason, entry.tick) for entry in state.recovered)
         gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in absences["away"]}
         for number, what, name, reason, tick in absences["over"]:
-            if number <= self._heard:
+            if number <= self._last_number:
                 continue
-            self._heard = number
+            self._last_number = number
             if self._known[what, name, reason, tick] > 0:
                 self._known[what, name, reason, tick] -= 1
                 continue
