@@ -64,7 +64,7 @@ nodes:
     robots: [red.goal, camera]
 players:
   keeper:
-    class: foosim.players.football:Team
+    class: foosim.library.table.players.football:Team
     rate: 100 Hz
     robots:
       red.goal: [encoder]

@@ -8,7 +8,7 @@ from foosim.common import limits
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.world.models.rod import RodRobot
+from foosim.library.table.rod import RodRobot
 
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 

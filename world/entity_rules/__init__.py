@@ -1,1 +1,0 @@
-"""Rules of entities: what an entity does by itself after it was solved, one file each."""

@@ -1,1 +1,0 @@
-"""Models of what robots have to get along with: fires, doors."""

@@ -1,1 +1,0 @@
-"""What kits are made from: the settings of their sections, and what follows from these alone."""

@@ -1,1 +1,0 @@
-"""Sensors of rigid bodies: what they touch and hold."""
