@@ -30,7 +30,7 @@ def check(
 ) -> None:
     """Check a deployment file, with settings if there are any.
 
-    Prints all problems, one a line: file:line:column: problem, value, nearest valid name. What is wrong between fields
+    Prints all problems, one a line: file:line:column: problem, value, nearest valid name. Errors between fields
     is found when each field is right by itself. When there are no problems, the classes of the players on this machine
     are imported.
     """
@@ -117,7 +117,7 @@ def urdf(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Show the robot in a URDF file: its tree with joints, limits, masses and shapes, and what a deployment says of it.
+    """Show the robot in a URDF file: its tree with joints, limits, masses and shapes, and its entry of a deployment.
 
     The file is read as by a run, which refuses the same: what is shown is what is simulated. What is passed over is
     noted.
@@ -138,7 +138,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of deployment files, with the components of all installed packages.
 
-    Editors that know JSON Schema complete and check a file whose first line names it:
+    Editors with support of JSON Schema complete and check a file whose first line names it:
     `# yaml-language-server: $schema=FILE`.
     """
     from foosim.deployment.json_schema import deployment_schema_text

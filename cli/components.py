@@ -21,7 +21,7 @@ OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
     "entity_rule": ("writes", "shared"),
     "kit": ("entities", "rules", "presets"),
 }
-"""What is told of a form beside what all have: its fields."""
+"""The fields to print of a form, besides those of all forms."""
 SETTINGS_OF: Final[Mapping[str, str]] = {
     SensorSettings.__name__: "sensor",
     ActuatorSettings.__name__: "actuator",
@@ -38,7 +38,7 @@ BOUNDS: Final[Mapping[str, str]] = {
 
 
 def chosen(form: str | None, name: str | None) -> list[ComponentType]:
-    """Return all of the forms, or those that were asked for. Raises UnknownName."""
+    """Return the forms of a kind and name, or all of them. Raises UnknownName."""
     if form is not None and form not in FORMS:
         named = [one for one in FORMS if registry.lookup(one, form) is not None] if ":" not in form else []
         raise UnknownName(
@@ -51,7 +51,7 @@ def chosen(form: str | None, name: str | None) -> list[ComponentType]:
 
 
 def as_json(component: ComponentType) -> dict[str, Any]:
-    """Return all that there is to know of one."""
+    """Return all properties of one."""
     slots = getattr(component, "slots", {})
     about: dict[str, Any] = {
         "type": component.type_name,
@@ -79,7 +79,7 @@ def as_json(component: ComponentType) -> dict[str, Any]:
 
 
 def _settable(component: ComponentType) -> dict[str, str]:
-    """Return what can be set of one while a run goes on, and what is valid."""
+    """Return the fields that can be set during a run, each with its valid values."""
     if isinstance(component, Model):
         placed = {"at": "a pose"} if is_placed(component.settings) else {}
         its = placed | ({"down": "true or false"} if component.is_robot else {})
@@ -127,7 +127,7 @@ def lines(component: ComponentType) -> Iterator[str]:
 
 
 def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what is told of a form beside what all have; nothing of what is empty."""
+    """Yield the lines of a form's own fields; empty fields have none."""
     for whose, slots in about.get("each", {}).items():
         yield f"  slots of each {'robot' if whose == ROBOTS else whose}: {_counted(slots)}"
     if about.get("writes"):
@@ -135,7 +135,7 @@ def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
     if about.get("shared"):
         yield f"  slots that are the model's where it has them: {', '.join(about['shared'])}"
     if about["type"] == "model":
-        yield "  a robot" if about["is_robot"] else "  no robot: nobody owns it"
+        yield "  a robot" if about["is_robot"] else "  not a robot, has no owner"
         yield f"  moved by: {about['mover']}"
         for dynamics, its in about.get("variants", {}).items():
             slots = "by its settings" if its["slots"] is None else _counted(its["slots"])
@@ -171,7 +171,7 @@ def _plain(value: Any) -> Any:
 
 
 def _settings(component: ComponentType) -> Iterator[tuple[str, str, str | None]]:
-    """Yield key, what is valid, and the default of each setting; None where it is required."""
+    """Yield key, valid values and default of each setting; None where it is required."""
     schema = component.settings.model_json_schema(by_alias=True)
     yield from _properties(schema, schema.get("$defs", {}), "")
 
@@ -179,7 +179,7 @@ def _settings(component: ComponentType) -> Iterator[tuple[str, str, str | None]]
 def _properties(
     schema: Mapping[str, Any], definitions: Mapping[str, Any], path: str
 ) -> Iterator[tuple[str, str, str | None]]:
-    """Yield the settings of a schema; of one that has settings of its own these, after its key and a point."""
+    """Yield the settings of a schema; nested settings follow the key of theirs and a point."""
     required = schema.get("required", ())
     for key, value in schema["properties"].items():
         found = _followed(value, definitions)
@@ -194,12 +194,12 @@ def _properties(
 
 
 def _inner(value: Mapping[str, Any]) -> Any:
-    """Return the schema of what a mapping has by any name; nothing of what is none."""
+    """Return the schema of the values of a mapping with arbitrary names; empty for another schema."""
     return next(iter(value.get("patternProperties", {}).values()), value.get("additionalProperties", {}))
 
 
 def _followed(value: Any, definitions: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return what a schema refers to, and of one or nothing the one."""
+    """Return the schema without references, and without `or null`."""
     if not isinstance(value, dict):
         return {}
     if "$ref" in value:

@@ -190,7 +190,7 @@ def _three(what: str, unit: str, words: Sequence[str]) -> Numbers:
         if not isfinite(x + y + z):
             raise ValueError
     except ValueError:
-        raise BadValue(f"{needed}; not all of these are numbers", " ".join(words)) from None
+        raise BadValue(f"{needed}; not all are finite numbers", " ".join(words)) from None
     return x, y, z
 
 

@@ -86,7 +86,7 @@ def guard(run: str, name: str, command: list[str]) -> int:
     os.close(end)
     path.unlink(missing_ok=True)
     os.close(lock)
-    with suppress(OSError):  # others work there, or what it has written is there
+    with suppress(OSError):  # others work there, or its files are there
         folder.rmdir()
     return BY_SIGNAL - code if code < 0 else code
 
@@ -107,7 +107,7 @@ def _take_over(path: Path) -> int:
                 with suppress(ProcessLookupError):
                     os.kill(int(earlier), signal.SIGKILL)  # it holds the lock, so the number is its own
         else:
-            with suppress(FileNotFoundError):  # who had the lock before may have removed it with the folder
+            with suppress(FileNotFoundError):  # the former holder of the lock may have removed it with the folder
                 if os.path.samestat(os.fstat(lock), path.stat()):
                     os.ftruncate(lock, 0)
                     os.pwrite(lock, str(os.getpid()).encode(), 0)

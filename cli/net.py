@@ -110,7 +110,7 @@ def linted(file: Path, sets: list[str]) -> tuple[list[LinkSummary], bool]:
     if network is None:
         pinned, files = pin_assets(apply_sets(text, name, sets), name, file.parent)
         deployment = load_deployment(pinned, name).with_assets(files)
-        if VHUB not in places(deployment):  # else its machine has them, and looks
+        if VHUB not in places(deployment):  # else its machine has them, and checks them
             check_link_models(deployment.network, text, name, sets)
         return summaries(deployment), False
     files = read_files(file.parent, ".", network_files(network))
@@ -243,7 +243,7 @@ def set_link(
 ) -> None:
     """Change settings of a link rule until `heal settings`.
 
-    Keys are those of a rule, with dots for what is inside: burst.loss=1% burst.mean_bad=20ms. A mapping is written
+    Keys are those of a rule, with dots for keys of mappings: burst.loss=1% burst.mean_bad=20ms. A mapping is written
     whole.
     """
     show_answer(control.request("network", run, event={"set": {**nested(settings), "link": link}}), json)

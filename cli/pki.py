@@ -1,4 +1,4 @@
-"""The command `foosim pki`: certificates for those who take part in a run, control it or connect to it."""
+"""The command `foosim pki`: certificates of the processes and clients of a run."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def client(
 
 @app.command()
 def show(folder: Folder, json: JsonOption = False) -> None:
-    """Show whose certificates a folder has, until when, and what is wrong with them."""
+    """Show the certificates of a folder: their holders, ends and problems."""
     shown = pki.show_folder(folder)
     if json:
         print_json(

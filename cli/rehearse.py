@@ -79,14 +79,14 @@ def rehearse_command(
 
 
 def _rehearse(plan: Plan, nodes: int, capture: Path | None, json: bool) -> int:
-    """Rehearse what was asked for and show the result; return the exit code."""
+    """Rehearse the plan and show the result; return the exit code."""
     output, file = sys.stdout, plan.options.file
 
     def show(result: dict[str, Any]) -> int:
         if json:
             print_json(result, file=output)
         else:
-            print(_told(result), file=output, flush=True)
+            print(_text(result), file=output, flush=True)
         return FAILED if result["failed"] or result["quarantined"] else DONE
 
     def stuck(result: dict[str, Any]) -> None:
@@ -119,7 +119,7 @@ def _show(process: str, level: str, text: str) -> None:
         typer.echo(f"{process}: {level}: {text}", err=True)
 
 
-def _told(result: dict[str, Any]) -> str:
+def _text(result: dict[str, Any]) -> str:
     """Return a result for people."""
     seconds = (result["ticks"] - result["first_tick"]) * result["tick_ns"] / 1e9
     summary = "".join(f", {text}" for text in result["summary"])
@@ -144,7 +144,7 @@ HASH_SEED: Final = "4711"
 
 
 LAST_LINES: Final = 10
-"""Of what another process said before it failed."""
+"""Lines of another process's log that are shown when it fails."""
 
 
 def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> int:
@@ -160,7 +160,7 @@ def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> 
             if noted:
                 raise KeyboardInterrupt
             if shows:
-                _told_of_step(line)
+                _write_step(line)
 
         check.on_step = begun
         try:
@@ -170,7 +170,7 @@ def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> 
             if noted:
                 raise KeyboardInterrupt
         except KeyboardInterrupt:
-            _told_of_step(f"{label}: interrupted, {check.now}")
+            _write_step(f"{label}: interrupted, {check.now}")
             raise
     if not is_broken:
         print(f"{label}: the same world on 1, 2 and 3 nodes, in any order and company, in {ticks} ticks")
@@ -183,7 +183,7 @@ def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> 
 
 @contextmanager
 def _noted_interrupts() -> Iterator[list[int]]:
-    """Give the interrupts so far: Python drops one that is raised while an object is destroyed."""
+    """Raise earlier interrupts: Python drops one that is raised while an object is destroyed."""
     noted: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -204,7 +204,7 @@ def _all_broken(check: ComponentCheck, folder: Path) -> Iterator[str]:
         yield from elsewhere(check.text, check.name, check.ticks, check.first, folder)
 
 
-def _told_of_step(line: str) -> None:
+def _write_step(line: str) -> None:
     """Write a line beside the result, in one piece: an interrupt may come at any time."""
     sys.stderr.write(f"{line}\n")
     sys.stderr.flush()
@@ -229,8 +229,8 @@ def elsewhere(text: str, name: str, ticks: int, here: Mapping[str, Any], folder:
         environment = {**os.environ, "PYTHONHASHSEED": HASH_SEED}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        said = [line for line in done.stderr.splitlines() if line.strip()][-LAST_LINES:]
-        yield "\n  ".join([f"in another process it fails, with exit code {done.returncode}:", *said])
+        last = [line for line in done.stderr.splitlines() if line.strip()][-LAST_LINES:]
+        yield "\n  ".join([f"in another process it fails, with exit code {done.returncode}:", *last])
         return
     there = decode_json(done.stdout.splitlines()[-1].encode())  # before it is what modules print
     assert isinstance(there, dict), there

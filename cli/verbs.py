@@ -32,7 +32,7 @@ foosim simulates robots, the network between them, and the programs that control
 """
 
 COMPLETING: Final = "_FOOSIM_COMPLETE"
-"""Set by a shell that wants to know how a word may end."""
+"""Set by a shell to complete a word."""
 
 
 class Verbs(Group):
@@ -77,7 +77,7 @@ class Verbs(Group):
 
 
 def summary(name: str, where: str) -> str:
-    """Return the first paragraph of a verb's help, from the source of its module, which is not imported."""
+    """Return the first paragraph of a verb's help, from the source of its module, without importing it."""
     spec = find_spec(f"foosim.{where.partition(':')[0]}")
     assert spec is not None and spec.origin is not None, where
     found: dict[str, str | None] = {}
@@ -134,7 +134,7 @@ def foosim(version: VersionOption = False) -> None:
 
 
 def main() -> None:
-    """Run what was typed; without a word, print what a newcomer can do."""
+    """Run the command line; without a word, print the first steps."""
     if len(sys.argv) == 1 and COMPLETING not in os.environ:
         print(WELCOME, end="")
     else:

@@ -89,9 +89,9 @@ def view(  # noqa: PLR0913, PLR0917  # a command's options
     """
     offset_ns = read_offset(second, offset)
     options = ServeOptions(listen, certificate, key, view_only, open_browser, announce)
-    if what is not None and is_recording(what):
+    if what and is_recording(what):
         if view_only:
-            raise BadValue("--view-only goes with a live run; nobody can change a recording", what)
+            raise BadValue("--view-only is valid for a live run only; a recording cannot be changed", what)
         with reading():
             sources = open_sources(Path(what), second, offset_ns, pki)
     else:
@@ -131,7 +131,7 @@ def open_run_sources(
 
 
 def _followed_live(live: LiveSource, name: str, second: Path, offset_ns: int) -> list[Source]:
-    """Return a run and the recording that follows it. Raises BadValue, BadPoses, and what asking the run raises."""
+    """Return a run and the recording that follows it. Raises BadValue, BadPoses, and errors of the request."""
     with connect(name, "viewer") as control:
         what = control.describe()
         deployment = load_deployment(what["deployment"], what["deployment_name"])

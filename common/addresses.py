@@ -74,7 +74,7 @@ def parse_address(text: str, secured: bool | None = None) -> Address:
 
 
 def _in_brackets(text: str) -> str | None:
-    """Return a bare IPv6 address as it is written here; None for what is none."""
+    """Return a bare IPv6 address in the brackets that it needs; None for any other text."""
     protocol, slash, host = text.rpartition("/")
     try:
         return repr(f"{protocol}{slash}[{IPv6Address(host)}]")
@@ -94,7 +94,7 @@ def check_listen(text: str, insecure: bool, ports: int = 1, secured: bool = Fals
         raise BadValue(f"no room for {ports} ports", text)
     if not address.is_loopback and not insecure and not secured:
         raise Insecure(
-            f"{address} is reached by other machines, and any process that reaches it takes part; give --pki "
+            f"{address} is reached by other machines, and admits any process; give --pki "
             "DIR with certificates, or --insecure to allow it"
         )
     return address

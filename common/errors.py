@@ -1,7 +1,7 @@
 """Errors caused from outside: bad input, a refused request, a protocol violation of a peer.
 
 A programmer's error is an assertion. Everything that comes from outside (a file, a packet, a request, an argument)
-and is not acceptable raises a `Refused` or a class made from it, whose text names the place, the value and the valid
+and is not acceptable raises a `Refused` or a subclass, whose text names the place, the value and the valid
 choices, so that it can be shown to a person as it is. Each part of the project adds its own classes beside its code.
 """
 
@@ -51,7 +51,7 @@ class NotFinite(BadValue):
 
 
 def read_at(place: str, read: Callable[[str], Read], text: str) -> Read:
-    """Return `read` of a text; a BadValue that it raises names the place, such as an option."""
+    """Return `read(text)`; its BadValue gets the place, such as an option."""
     try:
         return read(text)
     except BadValue as bad:
@@ -88,18 +88,18 @@ def show(value: object, length: int = 48) -> str:
 
 
 def no_such(what: str, value: str, choices: Iterable[str]) -> BadValue:
-    """Return the error for a name that is none of the choices, with the nearest of them."""
+    """Return the error for a name outside the choices, with the nearest of them."""
     nearest = nearest_name(value, choices)
     return BadValue(what, value, None if nearest is None else show(nearest))
 
 
 class Malformed(Refused):
-    """Bytes, or a message made of them, that do not fit the schema or the world they claim to be about."""
+    """Bytes, or a decoded message, that do not fit the schema or the world of the run."""
 
 
 class UnknownName(BadValue):
-    """A robot, channel, destination or class that does not exist; the text lists those that do, and says what `also`
-    would be valid."""
+    """A robot, channel, destination or class that does not exist; the text lists the valid ones, and what is `also`
+    valid."""
 
     def __init__(self, what: str, value: str, choices: Iterable[str], also: str = "") -> None:
         names = sorted(set(choices))

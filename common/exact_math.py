@@ -4,7 +4,7 @@ The last bits of `math` and numpy depend on the machine, on the version and on t
 frame takes these functions instead; their bits never change. `foosim.common.batched.exact_arrays` has each of them for
 arrays: the same operations in the same order, with the constants of this module, hence the same bits.
 
-Angles are in rad. No argument raises: what is too large is `inf`, and what has no value is `nan`, always the same one,
+Angles are in rad. No argument raises: an overflow is `inf`, and an undefined value is `nan`, always the same one,
 since processors make NaNs of different signs. Zeros keep their signs as in Annex F of C99. Square roots come from
 `math.sqrt` and `numpy.sqrt`, which IEEE 754 defines to the last bit.
 
@@ -86,7 +86,7 @@ ATAN_BORDER1: Final = 0.4375
 ATAN_BORDER2: Final = 0.6875
 ATAN_BORDER3: Final = 1.1875
 ATAN_BORDER4: Final = 2.4375
-"""Where the arctangent goes over from 0 to 1/2, 1, 3/2 and infinity as the point that it is measured from."""
+"""Arguments at which the arctangent changes its reference point: from 0 to 1/2, 1, 3/2 and infinity."""
 ATAN_OF_HALF: Final = 0.4636476090008061
 ATAN_OF_HALF_LOW: Final = 2.2698777452961687e-17
 ATAN_OF_1: Final = 0.7853981633974483
@@ -118,7 +118,7 @@ TANH6: Final = 112.81167849163293
 
 LARGE: Final = 3.3519519824856493e153
 SMALL: Final = 3.2033329522929615e-145
-"""2^510 and 2^-480: what is beyond may not be squared."""
+"""2^510 and 2^-480: numbers beyond may not be squared."""
 UP: Final = 4.149515568880993e180
 DOWN: Final = 2.409919865102884e-181
 """2^600 and 2^-600."""
@@ -142,7 +142,7 @@ def exp(x: float) -> float:
 
 
 def log(x: float) -> float:
-    """Return the natural logarithm of x: -inf of zero, nan of what is negative."""
+    """Return the natural logarithm of x: -inf of zero, nan of a negative x."""
     if not 0.0 < x < inf:
         return -inf if x == 0.0 else inf if x > 0.0 else nan
     mantissa, exponent = frexp(x)
@@ -220,7 +220,7 @@ def _pi_times_2_to(bits: int) -> int:
 
 FRACTION_BITS: Final = 192
 PER_QUARTER_BITS: Final = 1280
-"""Enough for the largest float, 2^1024, and for the one that comes nearest to a whole number of quarters, 2^-62."""
+"""Enough for the largest float, 2^1024, and for the one nearest to a whole number of quarters, 2^-62."""
 HALF_PI_INTEGER: Final = _pi_times_2_to(FRACTION_BITS - 1)
 PER_QUARTER_INTEGER: Final = (1 << (2 * PER_QUARTER_BITS + 1)) // _pi_times_2_to(PER_QUARTER_BITS)
 

@@ -52,7 +52,7 @@ class Finding:
 
 
 def with_written(finding: Finding, data: Any) -> Finding:
-    """Return a finding with what is written at its location in plain data, of its `other`, too."""
+    """Return a finding with the value at its location in plain data, and at that of its `other`."""
     if finding.other is not None:
         finding = replace(finding, other=with_written(finding.other, data))
     if finding.value is not WRITTEN:
@@ -61,6 +61,6 @@ def with_written(finding: Finding, data: Any) -> Finding:
     for step in finding.location if finding.at == "value" else ():
         if isinstance(value, dict):
             value = value.get(step)
-        elif isinstance(value, list) and isinstance(step, int):  # else a single text stands in place of a list
+        elif isinstance(value, list) and isinstance(step, int):  # else a single text is in place of a list
             value = value[step]
     return replace(finding, value=value if finding.at == "value" else finding.location[-1])

@@ -1,4 +1,4 @@
-"""Times, bit rates and lengths as people read them."""
+"""Readable texts of times, bit rates and lengths."""
 
 from __future__ import annotations
 

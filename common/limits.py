@@ -11,7 +11,7 @@ PROTOCOL_VERSION: Final = 4
 NAME_LENGTH_MAX: Final = 32
 ENTITIES_MAX: Final = 4096
 FORMS_MAX: Final = 256
-"""Forms of a world that are not foosim's own."""
+"""Forms of a world from other packages."""
 FORM_NAME_MAX: Final = 400
 """Characters of a form with its module and class, and of its version."""
 NODES_MAX: Final = 256
@@ -83,7 +83,7 @@ FLIGHT_HEAD_BYTES: Final = 200
 RECOVERIES_PER_COMMIT_MAX: Final = 1_024
 """Losses and returns that a commit reports; the next one reports the rest."""
 HELD_MESSAGES_MAX: Final = 1024
-"""Messages that a node holds for an epoch that it does not know yet: parts of some ticks of all nodes."""
+"""Messages that a node holds for a coming epoch: parts of some ticks of all nodes."""
 KEPT_TICKS: Final = 16
 """Ticks of sent messages that each process keeps for repetition."""
 RELEASE_AHEAD: Final = 4

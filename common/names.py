@@ -58,7 +58,7 @@ def class_path_of(text: str) -> str | None:
 
 
 def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR) -> str | None:
-    """The choice most similar to the value; None when none is.
+    """The choice most similar to the value; None without one.
 
     Ties go to the longest common prefix, then to the first by name.
     """
@@ -78,7 +78,7 @@ def nearest_name(value: object, choices: Iterable[str], similar: float = SIMILAR
 
 
 def nearest_quoted(value: object, choices: Iterable[str]) -> str | None:
-    """The choice most similar to the value in quotes, as messages have it; None when none is."""
+    """The choice most similar to the value, in quotes as in messages; None without one."""
     return quoted(nearest_name(value, choices))
 
 

@@ -1,4 +1,4 @@
-"""The command that begins a new run with the last frame of a run that cannot go on."""
+"""The command that begins a new run with the last frame of a run that cannot continue."""
 
 from __future__ import annotations
 

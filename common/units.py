@@ -1,4 +1,4 @@
-"""Quantities as people write them (`2 ms`, `0.5 %`, `84 mm`) and as the code computes with them.
+"""Quantities: their texts (`2 ms`, `0.5 %`, `84 mm`) and their numbers in the code.
 
 In a file every quantity is a string with its unit. In the code it is a float in SI units, except time, which is an
 integer count of nanoseconds, counts of ticks, which are integers, and rates, which are exact fractions of hertz.
@@ -24,7 +24,7 @@ from foosim.common.names import nearest_name
 
 NS_PER_S: Final = 1_000_000_000
 NUMBERS_KEPT: Final = 4_096
-"""Quantities that are not read again: the robots of a fleet have most of theirs in common."""
+"""Cached quantities: the robots of a fleet have most of theirs in common."""
 
 _NUMBER: Final = r"[+-]?[0-9]{1,20}(?:\.[0-9]{1,30})?(?:[eE][+-]?[0-9]{1,2})?"
 _RATIO: Final = r"[0-9]{1,20}/[1-9][0-9]{0,19}"
@@ -46,7 +46,7 @@ class Dimension:
 
     @property
     def base(self) -> str:
-        """The unit whose size is 1: the one that values are shown in."""
+        """The unit whose size is 1, in which values are shown."""
         return next(unit for unit, size in self.units.items() if size == 1)
 
     @property
@@ -130,7 +130,7 @@ def parse(text: object, dimension: Dimension) -> Fraction:
 
 
 def _other_dimension(unit: str, dimension: Dimension) -> Dimension | None:
-    """What a unit of another kind measures; the base unit tells kinds apart, so that MHz is one of a rate, too."""
+    """Return the dimension of a foreign unit. Dimensions are equal by their base unit, so MHz is one of a rate, too."""
     others = [other for other in globals().values() if isinstance(other, Dimension) and unit in other.units]
     return next((other for other in others if other.base not in dimension.units), None)
 
@@ -146,7 +146,7 @@ def parse_ns(text: object) -> int:
     """A time (`20s`, `2 ms`) in integer nanoseconds, at least 0; raises BadValue."""
     value = parse(text, TIME)
     if value < 0:
-        raise BadValue("a time that is not negative is needed", text)
+        raise BadValue("negative; a time is at least 0", text)
     if value.denominator != 1:
         raise BadValue("not a whole number of ns", text)
     return int(value)
@@ -229,7 +229,7 @@ def parse_pace(text: object) -> Pace:
 class Quantity:
     """Annotation of a model's field: a string with a unit in the file, a number in the code, within bounds.
 
-    The bounds are written as in a file, so that messages show them as people write them.
+    The bounds are written as in a file, so that messages have the same texts.
     """
 
     dimension: Dimension
@@ -237,7 +237,7 @@ class Quantity:
     high: str
 
     def read(self, value: object) -> float | int | Fraction:
-        """Return the number; raises pydantic's error for a value that is no such quantity or out of bounds."""
+        """Return the number; raises pydantic's error for another quantity and for a value out of bounds."""
         return _number_of(self, value) if type(value) is str else self._number(value)
 
     def _number(self, value: object) -> float | int | Fraction:

@@ -1,4 +1,4 @@
-"""Wall time for people: the one place that reads it.
+"""Wall time for messages and names: the one place that reads it.
 
 It is used in logs, file names and run files, and compared with the dates of certificates. No decision of a run depends
 on it, since wall clocks jump: deadlines and lags use the monotonic clock of a shell.
@@ -21,7 +21,7 @@ def now_utc() -> datetime:
 
 
 def now_stamp() -> str:
-    """Return the local time as it may stand in a file's name: `20260301-130000`."""
+    """Return the local time for names of files: `20260301-130000`."""
     return datetime.now(UTC).astimezone().strftime("%Y%m%d-%H%M%S")  # noqa: TID251
 
 

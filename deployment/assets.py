@@ -34,8 +34,8 @@ def read_robot(file: Path, assets: Path | None) -> Robot:
 
 
 def _read(folder: Path, assets: str, path: str, known: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The content of one file by its path, beside those that are known. Raises AssetError, of a robot's mesh with the
-    place where the robot's file names it."""
+    """Return the content of one file by its path. Raises AssetError, for a mesh of a robot with the place in the
+    robot's file."""
     try:
         return read_files(folder, assets, [path], known)
     except AssetError as error:
@@ -50,8 +50,7 @@ def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes
     """The text with the digest of each file that it names, and the contents of these by path.
 
     `folder` is the one that the deployment's file is in. Raises DeploymentError, also for a wall without a thickness,
-    and AssetError for a file that is not acceptable: the contents are read once, and what the digests name is what was
-    checked.
+    and AssetError for an unacceptable file: the contents are read once, so the digests are of the contents checked.
     """
     deployment = load_deployment(text, name)
     files: dict[str, bytes] = {}

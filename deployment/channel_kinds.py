@@ -10,7 +10,7 @@ from foosim.world.forms.per_field import codec_of
 
 
 def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> PayloadCodec | None:
-    """Return what a channel of an endpoint carries: None for bytes, as on `echo`, and of players and clients.
+    """Return the type of a channel's payloads: None for bytes, as on `echo` and channels of players and clients.
 
     Raises UnknownName.
     """

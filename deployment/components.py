@@ -22,11 +22,11 @@ ROBOTS: Final = "robots"
 SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
 """The sections of a robot that have components, and their form."""
 OF_MODEL: Final = ("actuators", "rules")
-"""The sections of which a robot that says nothing has those of its model."""
+"""The sections that a robot without them has from its model."""
 
 
 def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Finding]]:
-    """Return a deployment's plain data with the settings of all component types read, and what is wrong with them.
+    """Return a deployment's plain data with the settings of all component types read, and the findings about them.
 
     `known` are the keys of a deployment; any other that is the name of a kit is that kit's section.
     """
@@ -55,7 +55,7 @@ def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Findin
 
 
 class _Reader:
-    """Reads the component types of one deployment, and gathers what is wrong."""
+    """Reads the component types of one deployment, and gathers findings."""
 
     def __init__(self) -> None:
         self.findings: list[Finding] = []
@@ -87,11 +87,11 @@ class _Reader:
         return None
 
     def kit(self, name: str, section: Any) -> Any:
-        """Return the settings of a kit; in place of what is refused, settings without any."""
+        """Return the settings of a kit; without keys in place of refused ones."""
         return self.settings(registry.find("kit", name).settings, section, (name,)) or SpecBase.model_construct()
 
     def entity(self, location: Location, robot: Any) -> Any:
-        """Return the settings of a robot or an object; in place of what is refused, settings of its model alone."""
+        """Return the settings of a robot or an object; with its model alone in place of refused ones."""
         if not isinstance(robot, dict):
             return robot
         name, is_robot, place = robot.get("model"), location[0] == ROBOTS, (*location, "model")
@@ -124,7 +124,7 @@ class _Reader:
         return RobotSettings.model_construct(model=name) if settings is None else settings.typed(model)
 
     def component(self, form: str, location: Location, data: Any) -> Any:
-        """Return the settings of one component; in place of what is refused, settings that say its kind alone.
+        """Return the settings of one component; with its kind alone in place of refused ones.
 
         What many robots share, by a template, is read once.
         """

@@ -45,7 +45,7 @@ def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
 
 
 def deployment_schema_text(*, installed: bool = False) -> str:
-    """What deploy/deployment.schema.json holds: the JSON Schema of a deployment's file, for editors and for people."""
+    """Return the content of deploy/deployment.schema.json: the JSON Schema of a deployment's file, for editors."""
     presets = {name: list(kit.presets) for name in registry.names("kit") if (kit := _kit(name)).presets}
     return json.dumps(file_schema(deployment_schema(installed=installed), presets), indent=2) + "\n"
 
@@ -69,7 +69,7 @@ def _class() -> dict[str, Any]:
 def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_robot: bool = True) -> dict[str, Any]:
     """Return the schema of anything of a form by its kind, and add that of each kind to the definitions.
 
-    Of models those of robots, or those of objects: what only a kit brings is none of these.
+    Of models those of robots, or those of objects, without the ones that only a kit brings.
     """
     key = "model" if form == "model" else "kind"
     mapping = {}

@@ -54,10 +54,10 @@ from foosim.world.spec import KITS
 DEPLOYMENT_KEYS: Final = frozenset(
     field.alias or name for name, field in Deployment.model_fields.items() if name != KITS
 )
-"""The keys of a deployment that are no kit's."""
+"""The keys of a deployment except those of kits."""
 DEPLOYMENTS_KEPT: Final = 32
-"""Deployments that are not read again: a rehearsal's processes all load the same text, which takes 20 ms each time.
-The swarm's worlds are 25 texts."""
+"""Cached deployments: all processes of a rehearsal load the same text, which takes 20 ms each time. The swarm's worlds
+are 25 texts."""
 SECTION_OF_KEY: Final = {"model": "robots", "shape": "scenery", "class": "players"}
 """What an unused template is for, by a key that it has."""
 
@@ -65,14 +65,14 @@ Text = str | Source
 """A deployment's text, alone or with the files that it includes."""
 
 _kept: dict[tuple[Text, str], tuple[Deployment, Tree | None]] = {}
-"""By text and name, the least recently used first; of canonical texts with what they were made from, with its places in
-the files as written."""
+"""By text and name, the least recently used first. A canonical text has the tree of its files, with their
+places."""
 
 
 def load_deployment(text: Text, name: str) -> Deployment:
     """The deployment in `text`; `name` is the file's in messages. Raises DeploymentError with all problems.
 
-    Equal texts give one value, which nobody changes: all processes of a rehearsal load the same.
+    Equal texts give one immutable value: all processes of a rehearsal load the same.
     """
     known = _kept.pop((text, name), None) or (read_deployment(text, name), None)
     return _keep(text, name, *known)
@@ -84,7 +84,7 @@ def read_deployment(text: Text, name: str) -> Deployment:
 
 
 def _keep(text: Text, name: str, deployment: Deployment, tree: Tree | None) -> Deployment:
-    """Cache a text's deployment as the most recently used, with the tree that it was made from."""
+    """Cache a text's deployment as the most recently used, with its tree."""
     while len(_kept) >= DEPLOYMENTS_KEPT:
         _kept.pop(next(iter(_kept)))
     _kept[text, name] = deployment, tree
@@ -211,7 +211,7 @@ def load_network(text: Text, name: str, sets: Sequence[str] = ()) -> Network | N
 
 
 def check_complete(text: Text, name: str, deployment: Deployment) -> None:
-    """Refuse what is known of a deployment with its files: walls without a thickness, robots whose files do not give
+    """Refuse errors that need a deployment's files: walls without a thickness, robots whose files do not give
     what their components need, and what starts in a mesh.
 
     `text` and `name` are what the deployment was loaded from. Raises DeploymentError.
@@ -239,7 +239,7 @@ def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Se
 
 
 def _check(tree: Tree | None, problems: Sequence[Problem]) -> Deployment:
-    """Build the deployment from a tree, or raise all problems, those that the reader found among them."""
+    """Build the deployment from a tree, or raise all problems, including those of the reader."""
     deployment = None
     found = list(problems)
     expanded = Expanded(None) if tree is None else expand(tree)
@@ -288,7 +288,7 @@ def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:
 
 
 def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
-    """What is wrong with templates that nobody is like, whatever would be added to them."""
+    """Yield the errors of unused templates that no further key could mend."""
     for name, (whole, _) in expanded.unused.items():
         section = next((of for key, of in SECTION_OF_KEY.items() if key in whole.values), None)
         if section is None:

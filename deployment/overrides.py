@@ -1,9 +1,9 @@
 """Settings of a command line, `--set a.b=VALUE`, placed in the tree of a deployment file.
 
-The path is made of keys joined by dots, as messages print it: `robots.arm.sensors.encoder.rate`. Where names hold
-dots themselves, the longest key that fits is meant; a new one is written in double quotes. An entry of a list is named
-by its number, `[0]` or `.0`, or by its `id`. The value is YAML. Settings apply in order; what they hold is placed at
-`--set:N:COLUMN`, N counting settings from 1.
+The path consists of keys joined by dots, as in messages: `robots.arm.sensors.encoder.rate`. Where names have dots, the
+longest key that fits is meant; a new one is written in double quotes. An entry of a list is named by its number, `[0]`
+or `.0`, or by its `id`. The value is YAML. Settings apply in order; their places are `--set:N:COLUMN`, N counting
+settings from 1.
 
 They apply to the file as it is written. A path may lead through what an entry has by a template or a count: then the
 entry gets keys of its own, as if they were written in the file.
@@ -81,7 +81,7 @@ def nested(sets: Sequence[str]) -> dict[str, Any]:
             for step, column in steps[:-1]:
                 inner = node.values.setdefault(step, Fields(_place(number, column)))
                 if not isinstance(inner, Fields):
-                    raise _Misplaced(column, describe("set inside a value that is no mapping", step))
+                    raise _Misplaced(column, describe("set inside a value other than a mapping", step))
                 node = inner
             if value is not None:
                 node.values[steps[-1][0]] = value
@@ -148,7 +148,7 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
             taken.steps.append(entry)
             continue
         if not isinstance(node, Fields):
-            raise _Misplaced(steps[index][1], describe("set inside a value that is no mapping", steps[index][0]))
+            raise _Misplaced(steps[index][1], describe("set inside a value other than a mapping", steps[index][0]))
         key, used = _key(node.values, steps, index) or _key(taken.names(), steps, index) or (steps[index][0], 1)
         if index + used == len(steps):
             if taken.steps[:1] == [TEMPLATES] and _is_null(value) and key in node.values:
@@ -171,7 +171,7 @@ def _is_null(value: Tree) -> bool:
 
 @dataclass(slots=True)
 class _Taken:
-    """The way through a tree so far: what is there when templates and counts are expanded."""
+    """The path through a tree so far, in the tree with expanded templates and counts."""
 
     tree: Tree
     steps: list[str | int] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""The deployment: everything that a run is made from, as one frozen value.
+"""The deployment: all settings of a run, as one frozen value.
 
 This is the schema. Text becomes a `Deployment` in loader.py only, because what one field cannot know (every robot has
 one owner, every selector matches an endpoint, every rate is a whole number of ticks) is checked there too, by
@@ -36,7 +36,7 @@ SUPERVISOR, VHUB = names.PROCESS_NAMES_RESERVED
 
 
 class NodeSpec(Placed):
-    """A node, which computes: where, who starts it, whether the run needs it, the robots that it owns at the start.
+    """A node: its host, its launch, whether the run needs it, and the robots that it owns at the start.
 
     Roles that name the same `process` share one; else each has its own.
     """
@@ -65,7 +65,7 @@ class Player(Placed):
     on: RobotName | None = None
     process: Name | None = None
     launch: Literal["local", "manual"] = "local"
-    """Who starts it: `up`, or a person by the command that `up` prints, in a terminal of its own."""
+    """Started by `up`, or by hand with the command that `up` prints, in a terminal of its own."""
     restart: bool = True
     """Whether its process is started again when a signal has ended it, or it was lost with its machine; before the
     first tick, when it has no memory to lose, it always is."""
@@ -113,25 +113,25 @@ class Capture(SpecBase):
     bytes_max: Size | None = Field(default=None, alias="max_bytes")
     split_bytes: Size | None = Field(default=None, alias="split_size")
     split_ns: Span | None = Field(default=None, alias="split_time")
-    """Another file is begun, with the next captured frame, when one has so many bytes, or so much simulated time."""
+    """A file ends at this size or simulated time; the next one begins with the next captured frame."""
     last_ns: Span | None = Field(default=None, alias="last")
-    """Of a capture that is split, files are removed that hold nothing of so much simulated time."""
+    """Files of a split capture are removed when all that they hold is older than this simulated time."""
 
     @property
     def is_split(self) -> bool:
-        """Whether the capture goes on in further files."""
+        """Whether the capture continues in further files."""
         return self.split_bytes is not None or self.split_ns is not None
 
 
 class AccessSpec(SpecBase):
-    """Who may control the run, and who may look at it, in a run with certificates."""
+    """The operators and viewers of a run with certificates."""
 
     operators: list[OperatorName] = Field(default=["admin"], max_length=limits.OPERATORS_MAX)
     viewers: list[OperatorName] = Field(default=[], max_length=limits.OPERATORS_MAX)
 
 
 class Deadlines(SpecBase):
-    """How long the run waits for whom, in wall time."""
+    """The times that the run waits for processes, in wall time."""
 
     heartbeat_ns: Deadline = default("1 s", "heartbeat")
     tick_named_ns: Deadline = default("500 ms", "tick_named")
@@ -162,9 +162,9 @@ def _supported(value: object) -> object:
 
 
 class Deployment(WorldSpec):
-    """A whole run: the world, who computes it, who plays in it, what lies between, and how it is recorded.
+    """A whole run: the world, its nodes, its players, the network between them, and the recording.
 
-    Sections of kits, which make a world from few numbers, stand beside these keys: `table` and `hall` are such.
+    Sections of kits, which build a world from few numbers, are beside these keys, such as `table` and `hall`.
     """
 
     format: Annotated[Literal[2], BeforeValidator(_supported, json_schema_input_type=Literal[2])]
@@ -197,7 +197,7 @@ class Deployment(WorldSpec):
         return named | self.digests | mesh_files(self.scenery) | network_files(self.network)
 
     def wanted(self, files: Mapping[str, bytes]) -> list[str]:
-        """The files that are needed beside `files`, as far as these tell: one may name further ones."""
+        """Return the needed files that `files` lacks, as far as known: one may name further ones."""
         needed = [*mesh_files(self.scenery), *network_files(self.network), *self.robot_files(files)]
         return [path for path in dict.fromkeys(needed) if path not in files]
 
@@ -212,7 +212,7 @@ class Deployment(WorldSpec):
 
     @property
     def console(self) -> str:
-        """The endpoint of the console; empty where none is declared."""
+        """The endpoint of the console; empty without a declared one."""
         return next((name for name, client in self.clients.items() if client.console), "")
 
     def carriers(self) -> dict[str, str]:
@@ -226,7 +226,7 @@ class Deployment(WorldSpec):
         return Profiles(self.network if network is None else network, self.carriers(), self.console)
 
     def launch_of(self, role: str) -> Literal["local", "manual", "systemd"]:
-        """Who starts the process of a role."""
+        """The launch of the process of a role."""
         if role in self.nodes:
             return self.nodes[role].launch
         return self.players[role].launch if role in self.players else "local"
@@ -261,7 +261,7 @@ class Deployment(WorldSpec):
         ]
 
     def _has(self, endpoint: str, channel: str) -> bool:
-        """Whether an endpoint may say something on a channel: players and clients on any, robots on their own."""
+        """Whether an endpoint may send on a channel: players and clients on any, robots on their own."""
         robot = self.robots.get(endpoint)
         return robot is None or channel in (*robot.sensors, names.CHANNEL_ECHO)
 
@@ -274,7 +274,7 @@ class Deployment(WorldSpec):
 def places(deployment: Deployment) -> dict[str, str]:
     """Return the host of each role that has one, by name, and of each process that roles name.
 
-    Of the hosts with a label, each process in name order gets the one that has the fewest by then, ties by name.
+    Of the hosts with a label, each process in name order gets the host with the fewest by then, ties by name.
     """
     declared = deployment.declared_processes()
     roles: dict[str, Placed] = {**deployment.nodes, **deployment.players, VHUB: deployment.vhub}

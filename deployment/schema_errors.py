@@ -55,7 +55,7 @@ _BOUNDS: Final = {
 }
 UNKNOWN: Final = "unknown key"
 _BOOLEANS: Final = {"on": "true", "yes": "true", "off": "false", "no": "false"}
-# pydantic reports this for a field whose default depends on another one that is wrong: that one is reported anyway.
+# pydantic reports this for a field whose default depends on another, invalid one, which is reported anyway.
 _CONSEQUENCES: Final = frozenset({"default_factory_not_called"})
 
 
@@ -113,7 +113,7 @@ def _finding(detail: ErrorDetails, path: Location, root: "_Schema") -> Finding:
         nearest = quoted(names.class_path_of(str(value)))
     what = _PATTERNS.get(context.get("pattern", "")) or _KINDS.get(kind) or _bounds(kind, context) or detail["msg"]
     if kind == "bad_value" and isinstance(value, dict):
-        value = ABSENT  # what is wrong is between its settings, which the text names
+        value = ABSENT  # the error is between its settings, which the text names
     return Finding(location, what, location[-1] if is_key else value, nearest, "key" if is_key else "value")
 
 
@@ -136,7 +136,7 @@ def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
 def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
     choices = schema.get("enum", [schema.get("const")])
     finding = _not_a_choice(location, value, [str(choice) for choice in choices])
-    # A choice that is no text is not written in quotes.
+    # Only a text is written in quotes.
     return finding if isinstance(choices[0], str) else replace(finding, nearest=None)
 
 
@@ -199,7 +199,7 @@ class _Schema:
         return self._resolve(found if isinstance(found, dict) else {})
 
     def _resolve(self, schema: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The schema itself behind references, and behind `or null` and `or a list of them`."""
+        """The schema without references, and without `or null` and `or a list of them`."""
         while True:
             if "$ref" in schema:
                 schema = self._root["$defs"][schema["$ref"].removeprefix("#/$defs/")]

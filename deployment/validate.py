@@ -152,7 +152,7 @@ def _hosts(deployment: Deployment, ends: Names) -> Iterator[Finding]:
         if about.host is not None and about.host not in hosts:
             yield Finding((*role, "host"), "unknown host", nearest=ends.nearest(about.host, hosts))
         if about.label is not None and about.host is not None:
-            yield Finding((*role, "label"), "a label beside a host: one of them says where")
+            yield Finding((*role, "label"), "label beside host: only one of them is valid")
         elif about.label is not None and about.label not in labels:
             yield Finding((*role, "label"), "a label that no host has", nearest=ends.nearest(about.label, labels))
         if about.host is None and about.label is None and getattr(about, "launch", "") == "systemd":
@@ -197,7 +197,7 @@ def _players(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 def _hears(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     """A player's `hears`: selectors that match another endpoint, channels that one of these has."""
     robots = deployment.robots
-    said: dict[str, set[str]] = {}
+    channels_of: dict[str, set[str]] = {}
     for player, about in deployment.players.items():
         for glob, channels in about.hears.items():
             location: Location = ("players", player, "hears", glob)
@@ -206,11 +206,11 @@ def _hears(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                 nearest = ends.nearest(glob, [name for name in ends.names if name != player])
                 yield Finding(location, "a selector that matches no other endpoint", nearest=nearest, at="key")
                 continue
-            if glob not in said:
-                said[glob] = {channel for name in matched if name in robots for channel in robots[name].sensors}
+            if glob not in channels_of:
+                channels_of[glob] = {channel for name in matched if name in robots for channel in robots[name].sensors}
             if any(name not in robots and name != player for name in matched):
                 continue
-            valid = {*said[glob], names.CHANNEL_ECHO}
+            valid = {*channels_of[glob], names.CHANNEL_ECHO}
             for index, channel in enumerate(channels):
                 if channel not in valid:
                     nearest = ends.nearest(channel, valid)
@@ -233,9 +233,9 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
             yield Finding(("clients", name, "lockstep"), "the console is not in lockstep: the run would wait for it")
         if client.on is not None:
             yield Finding(("clients", name, "on"), "the console is on board of no robot")
-    for index, name in enumerate(deployment.access.viewers):  # who would receive each other's answers
+    for index, name in enumerate(deployment.access.viewers):  # both would receive each other's answers
         if name in deployment.access.operators:
-            yield Finding(("access", "viewers", index), "a viewer who is an operator, too")
+            yield Finding(("access", "viewers", index), "a viewer that is an operator, too")
     if deployment.capture.last_ns is not None and not deployment.capture.is_split:
         yield Finding(("capture", "last"), "whole files are let go: needs split_size or split_time")
     deadlines = deployment.deadlines
@@ -248,7 +248,7 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _times(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Sensors have any rate up to that of the ticks, rates and offsets of who acts in lockstep are whole ticks, offsets
+    """Sensors have any rate up to that of the ticks, rates and offsets of lockstep clients are whole ticks, offsets
     are below their periods, and the clocks of radios are less than a tick apart.
     """
     tick_ns, substeps = deployment.tick_ns, deployment.substeps
@@ -263,7 +263,7 @@ def _times(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     seen: set[int] = set()
     for robot, settings in deployment.robots.items():
         for channel, sensor in settings.sensors.items():
-            if id(sensor) not in seen:  # robots that are like a template share its sensors
+            if id(sensor) not in seen:  # robots of a template share its sensors
                 seen.add(id(sensor))
                 yield from _sensor(sensor, ("robots", robot, "sensors", channel), tick_ns)
     if "poses_hz" in deployment.capture.model_fields_set:
@@ -279,7 +279,7 @@ def _acting(deployment: Deployment) -> Iterator[Finding]:
         for name, about in getattr(deployment, section).items():
             if not about.lockstep:
                 if "offset_ns" in about.model_fields_set:
-                    what = "an offset of who is not in lockstep: a free-running client has no ticks of its own"
+                    what = "offset without lockstep: a free-running client has no ticks of its own"
                     yield Finding((section, name, "offset"), what, at="key")
             elif about.rate_hz is None:
                 yield Finding((section, name, "rate"), "missing key of a client in lockstep", at="missing")
@@ -336,11 +336,11 @@ def _arrivals(deployment: Deployment, ends: Names, at: Location, player: Player,
         yield Finding((*at, "arrivals"), "missing key of a player that acts at arrival", at="missing")
     for glob, channels in arrivals.items():
         key = str(hears), glob
-        said = known.get(key)
-        if said is None:  # players that are like a template hear the same
-            said = known[key] = _said(deployment, ends, hears, glob)
+        sources_of = known.get(key)
+        if sources_of is None:  # players of one template hear the same
+            sources_of = known[key] = _sources_of(deployment, ends, hears, glob)
         heard = {name for robot, own in player.robots.items() if fnmatchcase(robot, glob) for name in own}
-        heard |= {channel for channel, sources in said.items() if any(source != at[-1] for source in sources)}
+        heard |= {channel for channel, sources in sources_of.items() if any(source != at[-1] for source in sources)}
         if not heard:
             others = (name for each in hears for name in ends.matched(each) if name != at[-1])
             nearest = ends.nearest(glob, chain(player.robots, others))
@@ -353,9 +353,11 @@ def _arrivals(deployment: Deployment, ends: Names, at: Location, player: Player,
                 yield Finding((*at, "arrivals", glob, index), what)
 
 
-def _said(deployment: Deployment, ends: Names, hears: Mapping[str, Sequence[str]], glob: str) -> dict[str, list[str]]:
-    """The channels to which `hears` subscribes of endpoints that a selector matches, each with two of these."""
-    said: dict[str, list[str]] = {}
+def _sources_of(
+    deployment: Deployment, ends: Names, hears: Mapping[str, Sequence[str]], glob: str
+) -> dict[str, list[str]]:
+    """Return the channels that `hears` takes of the endpoints of a selector, each with up to two of these."""
+    found: dict[str, list[str]] = {}
     matched = {*ends.matched(glob)}
     for selector, channels in hears.items():
         for source in ends.matched(selector) if channels else ():
@@ -364,16 +366,16 @@ def _said(deployment: Deployment, ends: Names, hears: Mapping[str, Sequence[str]
             robot = deployment.robots.get(source)
             own = channels if robot is None else (*robot.sensors, names.CHANNEL_ECHO)
             for channel in channels:
-                if channel in own and len(sources := said.setdefault(channel, [])) < 2 and source not in sources:
+                if channel in own and len(sources := found.setdefault(channel, [])) < 2 and source not in sources:
                     sources.append(source)
-    return {channel: sources for channel, sources in said.items() if sources}
+    return {channel: sources for channel, sources in found.items() if sources}
 
 
 # --- kits and scenery -------------------------------------------------------------------------------------------------
 
 
 def _kits(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Settings of a kit fit each other; what it brings into the world can be there, and has names of its own."""
+    """Settings of a kit fit each other; its entities and rules are valid, and have unique names."""
     kits = deployment.kit_types
     taken: dict[str, str] = {}
     for key, kit in kits.items():
@@ -402,7 +404,7 @@ def _kits(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _checked(kit: Kit, deployment: Deployment) -> list[Finding]:
-    """Return what a kit itself finds wrong with its section."""
+    """Return the kit's own findings about its section."""
     made: Any = kit.factory
     return [*made.check(deployment.kits[kit.name], deployment)]
 
@@ -420,7 +422,7 @@ def _called(found: ComponentType, what: str, function: Callable[..., Any], *argu
 
 
 def _spares(deployment: Deployment, kit: Kit) -> dict[str, str]:
-    """Return what a kit brings that is absent at the start, models by name. Raises BadValue."""
+    """Return the spares of a kit, models by name. Raises BadValue."""
     found: dict[str, str] = _called(kit, "spares", lambda: dict(spares_of(deployment, kit)))
     wrong = [name for name in found if not is_robot_name(name)]
     if wrong:
@@ -443,7 +445,7 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
     try:
         model = registry.find_model(name)
     except BadValue as error:
-        yield f"is of a model that is not there: {error}"
+        yield f"is of an unknown model: {error}"
         return
     if model.is_robot:
         yield f"is of the model {model.name}, which is one of robots: these have owners, and are in robots:"
@@ -453,7 +455,7 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
 
 
 def _wrong_rule(data: Mapping[str, Any], kits: Collection[str]) -> Iterator[str]:
-    """Yield what is wrong with a rule that a kit brings, as plain data."""
+    """Yield the errors of a kit's rule, given as plain data."""
     try:
         rule = registry.find("rule", data["kind"])
         rule.settings.model_validate(dict(data))
@@ -485,7 +487,7 @@ def _scenery(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _models(deployment: Deployment) -> Iterator[Model]:
-    """Yield the models of robots and objects, and of what kits put into the world."""
+    """Yield the models of robots and objects, and of the kits' entities."""
     yield from (one.component_type for one in (*deployment.robots.values(), *deployment.objects.values()))
     for name in _brought(deployment).values():
         with suppress(Refused):  # reported with the kit
@@ -498,11 +500,11 @@ def _radio(radio: RadioMaterial, location: Location) -> Iterator[Finding]:
         yield Finding((*location, "is"), "missing key of a material, unless it has a loss", at="missing")
     for key, value in (("is", radio.is_), ("thickness", radio.thickness_m)):
         if value is not None and radio.loss_db is not None:
-            yield Finding((*location, key), "a loss holds whatever it is made of: not beside one", at="key")
+            yield Finding((*location, key), "no effect beside loss, which holds for any material", at="key")
 
 
 def _open_meshes(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Meshes that are not closed, of a material of which it is not said how thick."""
+    """Yield open meshes of a material without a thickness."""
     for thing in deployment.open_meshes():
         radio = deployment.scenery[thing].radio
         material = "concrete" if radio is None or radio.is_ is None else radio.is_
@@ -514,10 +516,10 @@ def _open_meshes(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Models, components and rules find in the world, and on their robot, what they need.
+    """The needs of models, components and rules are met by the world and their robot.
 
-    Nothing is known of robots whose state follows from files that are not there. What many robots share, by a template,
-    is checked once.
+    Robots whose state follows from missing files are passed over. What many robots share, by a template, is checked
+    once.
     """
     kits = deployment.kits
     met: set[tuple[int, int]] = set()
@@ -570,7 +572,7 @@ def _model_problems(model: Model, kits: Collection[str], has: Mapping[str, int] 
 
 
 def _component_problems(form: ComponentType, model: Model, has: Mapping[str, int] | None) -> Iterator[str]:
-    """Yield what a robot of a model does not have that a component or rule of it needs; `has` as above."""
+    """Yield the needs of a component or rule that a robot of a model does not meet; `has` as above."""
     word = word_of(form.type_name)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
     if isinstance(form, Component) and (field := _trigger_of_model(form)) and field not in needs:
@@ -579,7 +581,7 @@ def _component_problems(form: ComponentType, model: Model, has: Mapping[str, int
     if missing:
         fitting = ", ".join(_having(needs))
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {_fields_of(model, missing, has)}")
-        yield (f"{word} that {with_article(model.name)} cannot carry, which has no {', '.join(missing)} ({valid})")
+        yield f"{word} that {with_article(model.name)} cannot carry, for lack of {', '.join(missing)} ({valid})"
     if isinstance(form, Component) and form.jobs and not model.is_solved:
         yield f"{word} whose jobs would never end: {with_article(model.name)} is neither rigid nor has a motion"
     if not isinstance(form, EntityRule):
@@ -618,7 +620,7 @@ def _trigger_of_model(sensor: Component) -> str:
 
 
 def _fields_of(model: Model, missing: Sequence[str], having: Mapping[str, int] | None) -> str:
-    """Return which fields a model has, and the one that is nearest to the first of those that it has not."""
+    """Return the fields of a model, and the nearest to the first missing one."""
     fields = [*(having or ())]
     shown = ", ".join(fields[:CHOICES_MAX]) + (", ..." if len(fields) > CHOICES_MAX else "")
     nearest = nearest_name(missing[0], fields)
@@ -672,7 +674,7 @@ def _unfit_component(
     for number, modifier in enumerate(settings.modifiers):
         place: Location = (*location, "modifiers", number)
         if numbers is None:
-            what = f"a modifier of what is not numbers alone: {component.type_name} {component.name}"
+            what = f"a modifier changes numbers alone, and this has others: {component.type_name} {component.name}"
             yield Finding((*place, "kind"), what, modifier.kind)
         else:
             yield from _unfit_modifier(modifier, Carrier(numbers.size, period_ns), numbers, place)
@@ -700,8 +702,8 @@ def _competing(actuators: Mapping[str, ActuatorSettings], location: Location) ->
 
 
 def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None) -> tuple[int, str] | None:
-    """Return the place of a joint among those that an actuator commands, and how another one commands it; None where
-    none is. None for joints are all that the robot has."""
+    """Return the index of a joint of an actuator that another one commands, and a description; None where there is
+    none. None for joints are all joints of the robot."""
     if named is None:
         what = "the motors that" if theirs is None else f"all joints, of which {theirs[0]} is one that"
         return 0, f"commands {what} {other} commands already"
@@ -716,7 +718,7 @@ def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None
 def _unfit_modifier(
     settings: ModifierSettings, carrier: Carrier, numbers: Numbers, place: Location
 ) -> Iterator[Finding]:
-    """Yield what is wrong with a modifier on these numbers."""
+    """Yield the errors of a modifier on these numbers."""
     component: Component = settings.component_type
     keys = {field.alias or name: name for name, field in component.settings.model_fields.items()}
     findings = []
@@ -745,7 +747,7 @@ def _unfit_modifier(
 
 
 def _value_of(error: BadValue, kind: str) -> object:
-    """Return the value that an error is about; that of a component is its kind where none is said."""
+    """Return the value of an error, or the kind of its component where it has none."""
     return kind if error.value is ABSENT else error.value
 
 
@@ -787,7 +789,7 @@ def _doubles(all_of_it: Iterable[Declaring], entity: str) -> Iterator[Finding]:
 
 
 def _lasting_spares(spec: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield the spares that cannot be absent: only what has a place of its own, and is solved, comes and goes."""
+    """Yield the invalid spares: only a solved entity with its own place can be added and removed."""
     named: dict[str, Location] = {name: ("objects", name, "spare") for name, one in spec.objects.items() if one.spare}
     named |= {name: ("robots", name, "spare") for name, one in spec.robots.items() if one.spare}
     named |= {name: (kit.name,) for kit in spec.kit_types.values() for name in spares_of(spec, kit)}
@@ -819,7 +821,7 @@ def _unheard(spec: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _trial(deployment: Deployment, ends: Names) -> Iterable[Finding]:
-    """What a trial of forms of other packages finds; foosim's own are not tried."""
+    """Yield the findings of a trial of forms from other packages; foosim's own are not tried."""
     if not foreign_versions(deployment):
         return ()
     from foosim.world.assembly.trial import trial_findings  # brings numpy
@@ -844,7 +846,7 @@ def _start(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield components whose settings their robots or the world do not fit: a joint that is not there, for one."""
+    """Yield components whose settings do not fit their robots or the world: an unknown joint, for one."""
     checked = [
         (name, section, channel, settings)
         for name, robot in spec.robots.items()
@@ -868,7 +870,7 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 class _Rigid(NamedTuple):
-    """Where something rigid is declared, and what it is."""
+    """The locations of rigid entities, and their descriptions."""
 
     location: tuple[str, ...]
     what: str
@@ -920,7 +922,7 @@ def rigid_bodies(spec: Deployment) -> Iterator[_Rigid]:
 
 
 class Check(NamedTuple):
-    """A row of the table. A check is `of_entries` where it finds what is wrong with an entry by itself."""
+    """A row of the table. A check is `of_entries` where it reads each entry alone."""
 
     name: str
     find: Find
@@ -962,7 +964,7 @@ FILES: Final = ((Check("walls of meshes", _open_meshes),), (Check("what models a
 def stages(deployment: Deployment, *, with_files: bool = False) -> Iterator[tuple[Check, ...]]:
     """Yield the checks of a deployment by stages; each rests on those before, and is for one without problems in them.
 
-    `with_files` are those that files make possible which a deployment, loaded without problems, was given.
+    `with_files`: only the checks that need the contents of files, for a deployment that was loaded without problems.
     """
     if with_files:
         yield from (*FILES, *(STATE if deployment.asset_files else ()))

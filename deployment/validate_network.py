@@ -1,5 +1,5 @@
 """Checks of a deployment's `network:`: matches of selectors, settings that depend on each other or that a radio does
-not support, and events, also those that are requested during a run.
+not support, and events, also ones requested during a run.
 
 What rules set of radios is checked when no reference of the network is wrong, for then it is known which radio the
 packets of a pair go by. validate.py has the table of all checks.
@@ -67,13 +67,13 @@ _OF_MEDIUM: Final = {
 }
 """Keys that one medium alone reads."""
 PAIRS_MAX: Final = 200_000
-"""Pairs of endpoints that are looked at for settings without an effect: in a valid deployment that is no error."""
+"""Pairs of endpoints that are searched for settings without effect; further pairs are accepted."""
 _LIMITING: Final = {"rate_bps": "rate", "trace": "trace", "overhead_bytes": "overhead", "payload_max": "mtu"}
-"""Fields of a rule that not every medium heeds, and their keys."""
+"""Fields of a rule that some media ignore, and their keys."""
 SHOWN_MAX: Final = 20
 _UNDER: Final[Location] = ("network", "events", 0)
 Kind = tuple[tuple[int, ...], tuple[str, ...], bool]
-"""What rules and radios know of an endpoint: the selectors that match it, by number, the radios that it has, and
+"""The properties of an endpoint for rules and radios: the selectors that match it, by number, its radios, and
 whether it is the console."""
 
 
@@ -196,7 +196,7 @@ def _chain(location: Location, loss: Fraction, bad: Fraction, mean: float) -> It
     share = loss / bad
     least = 1 / (1 - max(Fraction(0), 2 - 1 / share) * bad)
     if mean < least:
-        what = f"so much loss comes in bursts of at least {float(least):.4g} packets"
+        what = f"this loss needs bursts of at least {float(least):.4g} packets"
         yield Finding((*location, "mean_burst"), what)
     elif bad < 1 and mean >= 1 / (1 - bad):
         what = f"with this bad_loss bursts are shorter than {float(1 / (1 - bad)):.4g} packets"
@@ -204,7 +204,7 @@ def _chain(location: Location, loss: Fraction, bad: Fraction, mean: float) -> It
 
 
 def _exact(share: float) -> Fraction:
-    """Return a number as it is written, in tenths."""
+    """Return the text of a number, in tenths."""
     return Fraction(str(share))
 
 
@@ -232,7 +232,7 @@ def event_findings(ends: Names, location: Location, event: Event, links: Sequenc
         yield Finding((*location, key), f"beside {actions[0]}: an event does one thing", at="key")
     lasting = [key for key, value in (("for", event.lasts), ("until", event.until_ns)) if value is not None]
     if len(lasting) > 1:
-        yield Finding((*location, "until"), "beside `for`: one of them says how long", at="key")
+        yield Finding((*location, "until"), "beside `for`: only one of them is valid", at="key")
     for key in lasting if actions[0] not in ("partition", "clog") else ():
         yield Finding((*location, key), f"{actions[0]} happens at once", at="key")
     for index, group in enumerate(event.partition or ()):
@@ -267,20 +267,19 @@ def radio_findings(radio: Radio, location: Location) -> Iterator[Finding]:
     """Return the settings of a radio that it does not support."""
     written = radio.written
     settings = {**preset_settings(radio.preset), **written}
-    asked = [key for key in settings if settings[key] is not None and (key in written or key not in _OF_MEDIUM)]
-    for key in asked:
-        what = unheeded(key, radio.medium)
-        if what is None and key == "fixed_rate" and key in written and radio.rates != "fixed":
-            what = "has no effect without `rates: fixed`"
-        if what is not None:
-            yield Finding((*location, key), what, settings[key])
+    for key in [key for key in settings if settings[key] is not None and (key in written or key not in _OF_MEDIUM)]:
+        problem = unheeded(key, radio.medium)
+        if problem is None and key == "fixed_rate" and key in written and radio.rates != "fixed":
+            problem = "has no effect without `rates: fixed`"
+        if problem is not None:
+            yield Finding((*location, key), problem, settings[key])
     known = BANDWIDTHS[radio.standard]
     if radio.medium == "wifi" and radio.bandwidth_hz not in [units.parse(text, units.FREQUENCY) for text in known]:
-        what = f"not a bandwidth of {radio.standard} here, which has {' or '.join(known)}"
-        yield Finding((*location, "bandwidth"), what, settings.get("bandwidth", "20 MHz"), repr(known[0]))
-    what = _unknown_airtime(radio)
-    if radio.duty_cycle < 1 and what is not None:
-        yield Finding((*location, "duty_cycle"), what, settings["duty_cycle"])
+        problem = f"not a bandwidth of {radio.standard} here, which has {' or '.join(known)}"
+        yield Finding((*location, "bandwidth"), problem, settings.get("bandwidth", "20 MHz"), repr(known[0]))
+    problem = _unknown_airtime(radio)
+    if radio.duty_cycle < 1 and problem is not None:
+        yield Finding((*location, "duty_cycle"), problem, settings["duty_cycle"])
     longest = lora_longest(radio.spreading_factor) if radio.medium == "lora" else None
     if longest is not None and "mtu" in written and (radio.payload_max or 0) > longest:
         yield Finding((*location, "mtu"), _too_long(radio.spreading_factor, longest))
@@ -302,48 +301,48 @@ def _unknown_airtime(radio: Radio) -> str | None:
 
 
 def rule_findings(profiles: Profiles, ends: Sequence[str]) -> Iterator[Finding]:
-    """Return which settings of rules, and of events for them, the radios do not heed by which packets go.
+    """Return the settings of rules, and of events for them, that the radios of their packets ignore.
 
     `ends` are the endpoints, none where they are not known: then only a rule's `via` is known.
     """
     network, ways = profiles.network, _Ways(profiles, ends)
     for number, rule in enumerate(network.links):
-        yield from ways.asked(rule, rule, ("network", "links", number))
+        yield from ways.unheeded(rule, rule, ("network", "links", number))
     for number, event in enumerate(network.events):
         yield from ways.changed(event, ("network", "events", number))
 
 
 class _Ways:
-    """By which radios the packets of rules go. Of the endpoints, one pair of each kind is looked at."""
+    """The radios of the packets of rules. Of the endpoints, one pair of each kind is read."""
 
     def __init__(self, profiles: Profiles, ends: Sequence[str]) -> None:
         self._profiles = profiles
         self._ends = ends
 
     def changed(self, event: Event, location: Location) -> Iterator[Finding]:
-        """Yield which settings of an event the radios do not heed."""
+        """Yield the settings of an event that the radios ignore."""
         change = event.set
         rules = self._profiles.network.links
         rule = None if change is None else next((rule for rule in rules if rule.id == change.link), None)
         if change is not None and rule is not None:
-            yield from self.asked(rule, change, (*location, "set"))
+            yield from self.unheeded(rule, change, (*location, "set"))
 
-    def asked(self, rule: LinkRule, settings: Impairments, location: Location) -> Iterator[Finding]:
-        """Yield which of the settings of a rule, or of an event for it, the radios do not heed."""
-        asked = [field for field in _LIMITING if field in settings.model_fields_set and getattr(settings, field)]
-        ways = list(dict.fromkeys(self._of(rule))) if asked else []
-        for field in asked:
+    def unheeded(self, rule: LinkRule, settings: Impairments, location: Location) -> Iterator[Finding]:
+        """Yield the settings of a rule, or of an event for it, that the radios ignore."""
+        limits = [field for field in _LIMITING if field in settings.model_fields_set and getattr(settings, field)]
+        ways = list(dict.fromkeys(self._of(rule))) if limits else []
+        for field in limits:
             key = _LIMITING[field]
             for way in ways:
                 radio = self._profiles.base(way)
-                what = unheeded(key, radio.medium)
+                problem = unheeded(key, radio.medium)
                 if key == "mtu" and radio.medium == "lora":
                     longest = lora_longest(radio.spreading_factor) or 0
                     too_long = (settings.payload_max or 0) > longest
-                    what = _too_long(radio.spreading_factor, longest) if too_long else None
-                if what is not None:
+                    problem = _too_long(radio.spreading_factor, longest) if too_long else None
+                if problem is not None:
                     by = way or self._profiles.network.defaults.preset
-                    yield Finding((*location, key), f"via {by}, {what}", key, at="key")
+                    yield Finding((*location, key), f"via {by}, {problem}", key, at="key")
                     break
 
     def _of(self, rule: LinkRule) -> Iterator[str]:
@@ -365,7 +364,7 @@ class _Ways:
 
     @cached_property
     def _pairs(self) -> list[tuple[str, str]]:
-        """Directed pairs of endpoints, one for each two kinds; a pair on one body goes another way than one on two."""
+        """Directed pairs of endpoints, one for each two kinds; a pair on one body has another link than one on two."""
         kinds = _kinds(self._profiles, self._ends)
         apart = permutations(_representatives(self._profiles, kinds), 2)
         on_body: dict[str, list[str]] = {}
@@ -380,7 +379,7 @@ class _Ways:
 
 
 def _kinds(profiles: Profiles, ends: Sequence[str]) -> dict[str, Kind]:
-    """Return what rules and radios know of each endpoint: the selectors that match it, and its radios."""
+    """Return the properties of each endpoint for rules and radios: the selectors that match it, and its radios."""
     rules = profiles.network.links
     globs = sorted({glob for rule in rules for glob in rule.selectors})
     matches = [re.compile(translate(glob)).match for glob in globs]
@@ -462,7 +461,7 @@ def event_text(deployment: Deployment, data: object, at_ns: int) -> str:
 
 def _requested(deployment: Deployment, data: dict[str, object], at_ns: int) -> list[Finding]:
     if "at" in data:
-        return [Finding(("at",), "an event that is asked for happens at the next tick, it has no time", "at", at="key")]
+        return [Finding(("at",), "a requested event happens at the next tick and has no time", "at", at="key")]
     links = [rule.id for rule in deployment.network.links]
     try:
         event = Event.model_validate({**data, "at": f"{at_ns} ns"})

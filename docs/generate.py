@@ -300,7 +300,7 @@ def write_limits() -> Iterator[str]:
 
 
 def write_deadlines() -> Iterator[str]:
-    """Yield the deployment's deadlines, then those that are constants."""
+    """Yield the deployment's deadlines, then the constant ones."""
     keys = deployment_schema()["$defs"]["Deadlines"]["properties"]
     assert keys.keys() == DEADLINES.keys(), f"deadlines without a description: {sorted(keys.keys() ^ DEADLINES.keys())}"
     yield "| deadline | time | process | waits for, and consequence |\n|---|---|---|---|\n"

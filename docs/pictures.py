@@ -1,7 +1,7 @@
 """`python -m docs.pictures [names...]`: makes the pictures of the docs from real runs, as Chromium shows the console.
 
-Seeds are fixed, and what is shown stands at a fixed tick: a live run is let go on to that tick, a capture is sought
-there. What the wall clock decides (lag, loads, the run's pace) differs from one making to the next.
+Seeds are fixed, and each picture is of a fixed tick: a live run is stepped to that tick, a capture is sought there.
+Figures of the wall clock (lag, loads, the run's pace) differ from one set of pictures to the next.
 Neighbours: `tests.wire.chromium` (the browser), `tests.wire.served` (captures served from this process).
 """
 
@@ -39,7 +39,7 @@ LIMIT_S: Final = 300.0
 SEED: Final = 5
 RUN: Final = "saturday"
 SLOW: Final = "0.02x"
-"""While processes start: the tick that is gone on to must not be over."""
+"""While processes start: the first tick to show must not be over."""
 PACE: Final = "0.5x"
 """Two cores that others use as well keep up with it."""
 TABLE_TICK: Final = 2500
@@ -74,7 +74,7 @@ class Album:
     folder: Path
 
     def take(self, name: str) -> None:
-        """Keep what is seen, once the page has drawn it and what it said for a moment is gone."""
+        """Keep a picture of the page, once it is drawn and passing messages are gone."""
         if name not in self.wanted:
             return
         self.page.get("document.activeElement.blur()")
@@ -99,8 +99,8 @@ def waited(what: str, found: Callable[[], Any]) -> Any:
     raise TimeoutError(f"waited {LIMIT_S:.0f} s for {what}")
 
 
-def go_on_to(page: Page, tick: int) -> None:
-    """Have a paused run go on to a tick, and the page show it."""
+def step_to(page: Page, tick: int) -> None:
+    """Step a paused run to a tick, and wait for the page to show it."""
     control.request("step", RUN, count=tick - int(control.status(RUN)["ticks"]))
     waited(f"tick {tick}", lambda: control.status(RUN)["ticks"] == tick)
     page.until(f"{STAT}.drawn === {tick} && {STAT}.paused")
@@ -120,8 +120,8 @@ def running(folder: Path) -> Iterator[tuple[int, str]]:
         waited("its first tick", lambda: control.status(RUN)["ticks"] > 0)
         control.request("pause", RUN)
         control.request("rate", RUN, pace=PACE)
-        told = waited("the console", lambda: path.exists() and json.loads(path.read_text()))
-        yield up.pid, str(told["operate"])
+        served = waited("the console", lambda: path.exists() and json.loads(path.read_text()))
+        yield up.pid, str(served["operate"])
         control.request("down", RUN)
         up.wait(LIMIT_S)
     finally:
@@ -141,17 +141,17 @@ def live(album: Album, folder: Path) -> None:
         for name in PLOTTED[:4]:
             plot(page, name)
         page.click("#tab-network")
-        go_on_to(page, TABLE_TICK)
+        step_to(page, TABLE_TICK)
         page.click("#tab-world")
         album.take("table")
         page.click("#tab-network")
         page.click("table.links tbody tr", "".join(LINK))
-        go_on_to(page, KILL_TICK)
+        step_to(page, KILL_TICK)
         (blue,) = (pid for pid, words in children(launcher).items() if name_of(words) == "blue")
         os.kill(blue, signal.SIGKILL)
-        go_on_to(page, CUT_TICK)
+        step_to(page, CUT_TICK)
         control.request("network", RUN, event=CUT)
-        go_on_to(page, END_TICK)
+        step_to(page, END_TICK)
         page.click(".drops summary", "partition")
         page.get("document.querySelector('.drops').scrollIntoView()")
         album.take("network")

@@ -113,7 +113,7 @@ def _detach(plan: Plan, capture: Path | None, run: str | None) -> RunFolder:
     try:
         while (code := process.poll()) is None and ((info := folder.info()) is None or not info.radio):
             time.sleep(POLL_S)
-    except KeyboardInterrupt:  # then the command says that the run has not begun
+    except KeyboardInterrupt:  # then the command reports that the run has not begun
         process.terminate()
         process.wait()
         raise

@@ -31,7 +31,7 @@ class Kind(NamedTuple):
     is_awaited: bool
     """Whether no tick is computed without it: its first two restarts have no back-off."""
     liveness: str
-    """The detection of one that hangs."""
+    """The detection of a process that hangs."""
 
 
 KINDS: Final = {
@@ -96,7 +96,7 @@ class Commands:
         return [*command, *_each("--node", nodes), *_each("--player", players), *path]
 
     def _radio_address(self, info: RunInfo | None, remote: Remote | None) -> str:
-        """Return where the vHub listens: at the address that clients know, once it has listened."""
+        """Return the address where the vHub listens: that of the first time, which clients have."""
         address = self._plan.address
         known = info is not None and info.radio
         listen = replace(address, port=parse_address(info.radio).port) if known and info else address.next_port()

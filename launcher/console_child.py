@@ -35,7 +35,7 @@ def page_of(console: bool, opens: bool, second: Path | None, offset: str | None,
     if not (console or opens):
         for option, value in (("--second", second), ("--offset", offset)):
             if value is not None:
-                raise BadValue(f"{option} goes with --console", str(value))
+                raise BadValue(f"{option} is valid with --console only", str(value))
         return None
     if detached:
         raise BadValue("--console and --detach exclude each other; foosim view shows a run in the background")

@@ -52,7 +52,7 @@ def pace_text(status: dict[str, Any]) -> str:
 
 
 def world_texts(status: dict[str, Any]) -> list[str]:
-    """Return a summary of the world: what its rules and kits say, and who solves its free bodies."""
+    """Return a summary of the world: the texts of its rules and kits, and the solvers of its free bodies."""
     solvers = [f"{name} solved by {node}" for name, node in status["solvers"].items()]
     return [*status["summary"], *solvers[:SOLVERS_SHOWN_MAX]]
 
@@ -247,7 +247,7 @@ class Output:
             self._drop()
 
     def _drop(self) -> None:
-        """Have the rest, and what the stream still holds, written to nowhere: Python flushes it at its end."""
+        """Discard the rest of the stream and its buffer, which Python flushes at its end."""
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self._stream.fileno())
         os.close(nowhere)
@@ -257,7 +257,7 @@ class Output:
 
 
 def unfailing_output() -> AbstractContextManager[object]:
-    """Make both output streams such that errors in writing do not end the run."""
+    """Wrap both output streams, so that errors in writing do not end the run."""
     with ExitStack() as stack:
         if sys.stdout is not None:  # it is None where it was closed before the start, which nothing minds
             stack.enter_context(redirect_stdout(cast(TextIO, Output(sys.stdout))))

@@ -66,7 +66,7 @@ State = Literal["fine", "warning", "problem"]
 HERE: Final = "here"
 PLACEMENT: Final = "placement"
 TIME_ERROR: Final = 5
-"""Result of `adjtimex` for a clock that is not synchronized."""
+"""Result of `adjtimex` for an unsynchronized clock."""
 PYTHON_TESTED: Final = (3, 11)
 
 
@@ -359,8 +359,8 @@ CLOCK_WARN_NS: Final = 50_000_000
 class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The planned run, and the requested checks: `host` is the name of this machine.
 
-    `ca` is the fingerprint of the run's root, empty for a run without certificates. `reach` is where the supervisor
-    would listen, and somebody does meanwhile, `radio` where a vHub on this host would; empty what cannot be tried.
+    `ca` is the fingerprint of the run's root, empty for a run without certificates. `reach` is the address of the
+    supervisor, where the doctor listens meanwhile, `radio` that of a vHub on this host; empty ones are not tried.
     """
 
     host: str
@@ -400,20 +400,20 @@ def examine_all(case: Case, name: str, text: str, limit_s: float = LIMIT_S) -> l
             root = fingerprint(read_ca(case.pki, wall_clock.now_utc()))
     question = Question("", name, text, case.listen, case.insecure, root, reach, "")
 
-    def ask_one(remote: Remote) -> list[Finding]:
+    def check_host(remote: Remote) -> list[Finding]:
         radio = str(case.radio) if reach and remote.name == places(case.deployment).get(VHUB) else ""
         about = msgspec.structs.replace(question, host=remote.name, radio=radio)
-        return ask(remote, about, limit_s, case.deployment.mixed_cpu)
+        return checks_of(remote, about, limit_s, case.deployment.mixed_cpu)
 
     listener = listening(address) if can_be_tried else nullcontext()
     with listener, ThreadPoolExecutor(min(len(hosts), HOSTS_AT_ONCE)) as pool:
-        return [*found, *(finding for findings in pool.map(ask_one, hosts) for finding in findings)]
+        return [*found, *(finding for findings in pool.map(check_host, hosts) for finding in findings)]
 
 
-# --- asking ----------------------------------------------------------------------------------------------------------
+# --- one host --------------------------------------------------------------------------------------------------------
 
 
-def ask(remote: Remote, question: Question, limit_s: float, mixed_cpu: bool = False) -> list[Finding]:
+def checks_of(remote: Remote, question: Question, limit_s: float, mixed_cpu: bool = False) -> list[Finding]:
     """Run the checks of one host within a time limit; return its findings, and those of the comparison with it."""
 
     def unanswered(problem: str, remedy: str) -> list[Finding]:

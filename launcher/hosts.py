@@ -72,7 +72,7 @@ class Remote:
 
     @property
     def foosim(self) -> str:
-        """The command as it is called there."""
+        """The name of the command there."""
         return FOOSIM if self.host.commands is None else f"{self.host.commands.rstrip('/')}/{FOOSIM}"
 
     def pki_arguments(self) -> list[str]:
@@ -112,7 +112,7 @@ class Remote:
 
     @staticmethod
     def is_away(code: int, lines: Sequence[str]) -> bool:
-        """Whether it was the network: the machine may come back by itself."""
+        """Whether the network has failed: the machine may come back by itself."""
         return code == SSH_FAILED and any(text in line for line in lines for text in _AWAY)
 
 

@@ -127,11 +127,11 @@ class StalledWatch:
             now_s = times_s[name]
             known, since_s = before.get(name, (pid, now_s))
             self._lost[name] = pid, since_s if known == pid else now_s
-            took_part = last == pid and looks >= LOOKS_MIN
-            patience_s = self._start_s if not took_part else CUT_OFF_S if name in away else STALLED_S
-            if now_s >= self._lost[name][1] + patience_s:
+            was_member = last == pid and looks >= LOOKS_MIN
+            limit_s = self._start_s if not was_member else CUT_OFF_S if name in away else STALLED_S
+            if now_s >= self._lost[name][1] + limit_s:
                 why = f"the run had lost it{_reason(status, name)}"
-                killed[name] = f"{why}, and it did not come back within {patience_s:g} s"
+                killed[name] = f"{why}, and it did not come back within {limit_s:g} s"
         return killed
 
 
@@ -145,7 +145,7 @@ PROC: Final = Path("/proc")
 OBSERVED_EVERY_S: Final = 0.2
 """The shortest time between two observations of a process."""
 STARVED_S: Final = 5.0
-"""A process is starved if it lacked a processor for more than half of such a time."""
+"""A process is starved if it lacked a processor for more than half of this time."""
 WARNED_EVERY_S: Final = 30.0
 """The shortest time between two warnings."""
 

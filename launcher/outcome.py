@@ -47,7 +47,7 @@ def result_without_supervisor(known: Mapping[str, Any], reason: str) -> dict[str
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Result of a run: its JSON, and its messages for people."""
+    """Result of a run: its JSON, and its printed messages."""
 
     result: dict[str, Any]
     lines: tuple[str, ...]

@@ -166,7 +166,7 @@ def show_folder(folder: Path) -> list[Shown]:
 
 
 def _shown(folder: Path, identity: str) -> Shown:
-    """Return what is shown of an identity's certificate, without one of the root's."""
+    """Return the shown properties of an identity's certificate, or of the root's without one."""
     now, problem = wall_clock.now_utc(), ""
     path = certificate_path(folder, identity) if identity else folder / CA_FILE
     try:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from foosim.world.start import Start
 
 DESCRIPTORS: Final = 48
-"""What the process with the most file descriptors has: its files, Zenoh's own, operators; 24 were measured."""
+"""File descriptors of the process with the most: its files, Zenoh's own, operators; 24 were measured."""
 DESCRIPTORS_PER_ROLE: Final = 2
 """Of each node, player and client: its link, and one that it replaces."""
 
@@ -175,13 +175,13 @@ def default_capture(world: str, stamp: str) -> Path:
 
 
 def check_texts(*paths: Path | None) -> None:
-    """Raise BadValue for a path that is not UTF-8: files of the run, its messages and its capture have it as a text."""
+    """Raise BadValue for a path outside UTF-8: files of the run, its messages and its capture have it as a text."""
     for path in paths:
         text = "" if path is None else str(path.absolute())
         try:
             text.encode()
         except UnicodeEncodeError:
-            raise BadValue("a path that is not UTF-8", text) from None
+            raise BadValue("path is not valid UTF-8", text) from None
 
 
 def check_capture(path: Path) -> Path:
@@ -202,7 +202,7 @@ def check_capture(path: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The nearest existing folder to one that a run writes to, and the free space of its disk."""
+    """Return the nearest existing parent of a folder of a run, and the free space of its disk."""
 
     there: Path
     room: Room
@@ -224,7 +224,7 @@ class Place:
 
 
 def place_of(settings: Capture, folder: Path, *, is_capture: bool = False) -> Place:
-    """Return the room for what a run writes to a folder, which need not be there yet; raises OSError.
+    """Return the room for the files of a run in a folder, which may be missing yet; raises OSError.
 
     `is_capture`: it is the capture, without which a run may continue. Else it is a journal.
     """

@@ -149,7 +149,7 @@ class Child:
     killed: str = ""
     """Why the launcher killed it; empty when it did not."""
     left_early: bool = False
-    """Whether it ended with exit code 0 while the run went on, as by `os._exit(0)`."""
+    """Whether it ended with exit code 0 before the run did, as by `os._exit(0)`."""
 
     @property
     def exit_code(self) -> int | None:
@@ -168,7 +168,7 @@ class Child:
 
     @property
     def ending(self) -> str:
-        """How it ended, for people."""
+        """Its end in words."""
         code = self.exit_code
         if code is None:
             return "is alive"
@@ -179,7 +179,7 @@ class Child:
     def kill(self, why: str) -> None:
         """Kill it for a reason that is reported; it logs its stack before."""
         self.killed = why
-        if self.ask_for_stack():
+        if self.end_with_stack():
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(STACK_S)
         self.process.kill()
@@ -191,7 +191,7 @@ class Child:
         calls = [call for call in _CALL.findall(stack) if not in_library(call[0])]
         return f" at {Path(calls[0][0]).name}:{calls[0][1]} in {calls[0][2]}" if calls else ""
 
-    def ask_for_stack(self) -> bool:
+    def end_with_stack(self) -> bool:
         """Make a role's process on this machine log its stack and end; False for any other process."""
         shows = self.command[:2] == ROLE and self.remote is None
         if shows:
@@ -226,7 +226,7 @@ class Launcher:
     """All children of this process, in the order in which they were started."""
 
     def __init__(self, run: str = "", remotes: Mapping[str, Remote] | None = None, units: Sequence[str] = ()) -> None:
-        """`remotes` are the machines of the processes of this run that are not to run on this one, by name.
+        """`remotes` are the machines of the processes of this run on other machines, by name of the process.
 
         `units` are those among them that systemd runs there.
         """
@@ -254,7 +254,7 @@ class Launcher:
         kills, source = oom_kills(), subprocess.DEVNULL if remote is None else subprocess.PIPE
         try:
             with log.open("ab") as file:
-                begin = file.tell()  # before the child shares this file, and its place
+                begin = log.stat().st_size
                 process = subprocess.Popen(
                     line, stdin=source, stdout=file, stderr=subprocess.STDOUT, process_group=0, **about
                 )
@@ -285,7 +285,7 @@ class Launcher:
         """End all children: SIGTERM, then, after the grace period, SIGKILL; hanging roles log their stacks before."""
         self._signal(signal.SIGTERM)
         if not self.wait(grace_s):
-            if [child for child in self.alive() if child.ask_for_stack()]:
+            if [child for child in self.alive() if child.end_with_stack()]:
                 self.wait(STACK_S)
             self.kill()
 

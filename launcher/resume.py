@@ -1,4 +1,4 @@
-"""Resuming a run whose launcher is gone, and recovering the capture of one that is not resumed.
+"""Resuming a run whose launcher is gone, and recovering the captures of other runs.
 
 Everything is checked before anything is started: both journals, which are read entirely, and the capture's files. The
 error states the command that begins a new run.
@@ -149,7 +149,7 @@ def _last_commit(records: list[bytes]) -> int:
     return -1
 
 
-# --- captures of runs that are not resumed ---------------------------------------------------------------------------
+# --- captures of other runs ------------------------------------------------------------------------------------------
 
 
 def recover_leftovers(report: Callable[[str], None], but: str | None = None) -> None:

@@ -48,9 +48,9 @@ LEAVE_S: Final = 1.0
 AWAY_S: Final = 10.0
 """The same for other machines, whose process ends are noticed later."""
 HELD_S: Final = 5.0
-"""How long lines wait for the console's address while the run does not come up."""
+"""The time that lines wait for the console's address during a slow start of the run."""
 LOST_S: Final = 3.0
-"""Time for the supervisor to notice the end of a child; it does not know one that never sent a hello."""
+"""Time for the supervisor to notice the end of a child; it has no record of one without a hello."""
 HANGS_MAX: Final = 2
 """A process with supervisor and players that has hung so often is given up: a player would make it hang again."""
 ENDED: Final = ("ended", "failed")
@@ -239,7 +239,7 @@ class Up:
         return info if info is not None and info.radio else None
 
     def _await(self, ready: Callable[[], RunInfo | None]) -> RunInfo | None:
-        """Return the first value of `ready` that is not None; None when the run is over, or is to end, before."""
+        """Return the first value of `ready` besides None; None when the run is over, or is to end, before."""
         held_s = time.monotonic() + HELD_S
         while self._continues():
             if time.monotonic() > held_s:
@@ -311,7 +311,7 @@ class Up:
             )
         self._start_wanted(status["starts"])
         if not self._has_ended and not self._ending_s:
-            self._restart_ended(now_s, knows=True)
+            self._restart_ended(now_s, has_status=True)
         self._end_stalled(status)
 
     def _start_wanted(self, starts: dict[str, int]) -> None:
@@ -383,17 +383,17 @@ class Up:
         self._start_due(now_s)
         return supervisor.name not in self._restarts.failed
 
-    def _restart_ended(self, now_s: float, knows: bool = False) -> None:
-        """Restart processes that ended before the run did; give up those that fail repeatedly or are refused.
+    def _restart_ended(self, now_s: float, has_status: bool = False) -> None:
+        """Restart processes that ended before the run did; give up processes that fail repeatedly or are refused.
 
-        `knows`: a new status has reported which nodes are stopped, and whether the run has begun.
+        `has_status`: a new status has reported which nodes are stopped, and whether the run has begun.
         """
-        may_judge = self._has_begun or knows or self._control is None
-        for child in self._launcher.ended() if may_judge else ():
+        may_decide = self._has_begun or has_status or self._control is None
+        for child in self._launcher.ended() if may_decide else ():
             roles = self._roles(child.name)
             is_kept = SUPERVISOR in roles or self._stopped.intersection(roles) or self._restarts.is_known(child.name)
             has_left = child.exit_code == DONE and not child.left_early
-            may_be_stopped = child.exit_code == REFUSED and not knows  # since the last status
+            may_be_stopped = child.exit_code == REFUSED and not has_status  # since the last status
             if not (is_kept or has_left or may_be_stopped) and self._comes_back(child):
                 self._restart_later(child, now_s)
         self._start_due(now_s)
@@ -416,7 +416,7 @@ class Up:
         for name in self._restarts.due(now_s):
             child = self._launcher.children[name]
             command: Sequence[str] = child.command
-            if VHUB in self._roles(name):  # with the address that clients know
+            if VHUB in self._roles(name):  # with the address that clients have
                 again, info = self.plan.processes[name], self.folder.info()
                 command = self._commands.of(again, info, self._launcher.remotes.get(name))
             self._launch(name, command)
@@ -425,7 +425,7 @@ class Up:
         """Whether the run waits for a replacement of this process, which has ended.
 
         Before the first tick this holds for a process that something else has ended: one that failed reports why. A
-        player that is not to be restarted is included: it has not acted, so it loses no state.
+        player with `restart: false` is included: it has not acted, so it loses no state.
         """
         roles = self._roles(child.name)
         restarts = {kind.restart for kind in kinds_of(roles, self.plan.deployment)}
@@ -434,8 +434,8 @@ class Up:
         if "unless refused" in restarts and (child.exit_code == REFUSED or is_given_up):
             return False
         if not self._has_begun:
-            is_orphan = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
-            return (is_lost or is_orphan) and not is_given_up
+            has_timed_out = child.exit_code == FAILED and self._restarts.has_ended(self._process_of[SUPERVISOR])
+            return (is_lost or has_timed_out) and not is_given_up
         if "after a signal" in restarts:  # a player that ends by itself has failed
             return is_lost and not is_given_up and all(player.restart for player in self._players(child.name))
         return roles != (SUPERVISOR,)  # of which `_supervisor_comes_back` decides
@@ -481,7 +481,7 @@ class Up:
         return (child.exit_code != DONE or child.left_early) and not self._comes_back(child)
 
     def _look_for_lost(self, now_s: float) -> None:
-        """Record the first child that ended unexpectedly; a killed one precedes those that ended because of it."""
+        """Record the first child that ended unexpectedly; a killed one precedes the others that ended for it."""
         if self._lost is None:
             bad = [
                 child
@@ -543,8 +543,8 @@ class Up:
             how = f"{name} {blamed.ending}{blamed.place}; its log is" if has_failed else f"the log of {name} is"
             return [f"{how} {blamed.log}"]
         reason = result["reason"]
-        is_said = child.ending in reason or child.name in self._restarts.failed
-        how = f"the log of {child.name} is" if is_said else f"{child.name} {child.ending}; its log is"
+        is_named = child.ending in reason or child.name in self._restarts.failed
+        how = f"the log of {child.name} is" if is_named else f"{child.name} {child.ending}; its log is"
         end = [f"    {line}" for line in child.last_lines() if not reason or reason not in line]
         return [f"{how} {child.log}", *end]
 

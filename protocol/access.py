@@ -57,7 +57,7 @@ class Grant:
     reads: tuple[str, ...]
     """Keys to which it may subscribe."""
     interests: tuple[str, ...]
-    """Keys whose subscribers it learns of: Zenoh sends nothing that has no subscriber."""
+    """Keys whose subscribers it learns of: Zenoh sends nothing without a subscriber."""
     alive: tuple[str, ...]
     """The keys of its presence: one for each role; none for people."""
     watches: str

@@ -22,7 +22,7 @@ class Publish:
 
 @dataclass(frozen=True)
 class Journal:
-    """Append one record to the process's journal, before anything that comes after."""
+    """Append one record to the process's journal, before any later action."""
 
     record: bytes
 

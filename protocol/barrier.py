@@ -186,7 +186,7 @@ class Barrier:
         )
         if not np.isfinite(values).all():
             nodes = [part.node for part in parts if not _is_finite(part)]
-            raise BadParts(f"tick {self.tick}: numbers of {', '.join(nodes)} that are not finite", nodes)
+            raise BadParts(f"tick {self.tick}: non-finite numbers of {', '.join(nodes)}", nodes)
         return Frame(self.tick, layout, values, {o.index: o.packets for part in parts for o in part.outboxes})
 
 

@@ -28,7 +28,7 @@ class Plane(Enum):
 class Channel:
     """One row of the table. Messages of an `express` channel are sent at once, unbatched.
 
-    A `blocking` channel holds its writer when a reader is slow; another one drops what a slow reader does not take.
+    A `blocking` channel holds its writer when a reader is slow; another one drops messages for a slow reader.
     """
 
     name: str
@@ -110,7 +110,7 @@ WANT: Final = _simulation(
 HEARTBEAT: Final = _simulation("heartbeat", messages.Heartbeat, "node, vhub", "supervisor", "10 Hz")
 TEMPO: Final = _simulation("tempo", messages.Tempo, "supervisor", "vhub", "a change, and an answer", named=False)
 WATCHED: Final = _simulation(
-    "watched", messages.Watched, "supervisor", "vhub", "what people look at changes, and an answer", named=False
+    "watched", messages.Watched, "supervisor", "vhub", "a change of what viewers watch, and an answer", named=False
 )
 END: Final = _simulation("end", messages.End, "supervisor", "node, vhub", "once", named=False)
 FAREWELL: Final = _simulation("farewell", messages.Farewell, "node, vhub", "supervisor", "once")
@@ -182,7 +182,7 @@ NODE_WAITS: Final[tuple[Channel, ...]] = (ORDER, PART, DELIVERIES)
 SUPERVISOR_WAITS: Final[tuple[Channel, ...]] = (PART, DELIVERIES)
 VHUB_WAITS: Final[tuple[Channel, ...]] = (COMMIT, SAMPLES, UP)
 CLIENT_WAITS: Final[tuple[Channel, ...]] = (DOWN,)
-"""The channels with messages at every tick, by role: it waits in the queue of the one that it lacks."""
+"""The channels with messages at every tick, by role: it waits in the queue of the missing one."""
 
 ALIVE: Final = {
     Plane.SIMULATION: "foosim/simulation/alive/{name}",

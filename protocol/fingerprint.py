@@ -22,7 +22,7 @@ def library_fingerprint() -> bytes:
 
     Of numpy also the world's arithmetic: square roots, quotients, products and sums.
     """
-    import numpy as np  # of those who compute; commands that only read settings do without
+    import numpy as np  # only where the world is computed: commands that only read settings do without
 
     hasher = blake2b(digest_size=32)
     for number in range(1, 4097):

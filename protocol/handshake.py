@@ -41,7 +41,7 @@ AGAIN_NS: Final = 200_000_000
 
 
 def sendable(text: str) -> str:
-    """Return a text without what UTF-8 does not have: an error of a user's code may say anything."""
+    """Return a text without characters outside UTF-8, such as in an error of a user's code."""
     return text.encode(errors="replace").decode()
 
 
@@ -79,7 +79,7 @@ class Member:
         """The deployment with this problem; another one may still be valid."""
         self.build: Build | None = None
         self._known: Build | None = None
-        """The build of the world that is here, also while it takes part in nothing."""
+        """The build of the present world, also outside of an epoch."""
         self.deployment: Deployment | None = None
         self.layout: Layout | None = None
         """The layout of the world at the build."""
@@ -171,7 +171,7 @@ class Member:
         """Whether a build is of the run that this process has built the world of, or the first one."""
         if self._known is None or (build.run, build.deployment) == (self._known.run, self._known.deployment):
             return True
-        self.refusal = f"the supervisor is that of another run, {build.run}, this takes part in {self._known.run}"
+        self.refusal = f"the supervisor is that of run {build.run}, this process belongs to {self._known.run}"
         self._actions.append(Log("error", self.refusal))
         return False
 
@@ -187,7 +187,7 @@ class Member:
         return True
 
     def recall(self, recall: Recall) -> bool:
-        """Send a hello to a supervisor that does not know this process, unless it is the known one."""
+        """Send a hello to a supervisor that misses this process, unless it is the known one."""
         if self.build is None or recall.boot in (self.build.supervisor, self._recalled_by):
             return False
         self._actions.append(Log("warning", "recalled by a restarted supervisor"))

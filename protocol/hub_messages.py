@@ -6,7 +6,7 @@ from foosim.common.struct_types import Counter, Digest, Message, Name, Numbers, 
 
 
 class ResumeState(Message, frozen=True):
-    """The vHub's position: the highest epoch that it knows, the bytes of its last commit (empty before the first), the
+    """The vHub's position: its highest epoch, the bytes of its last commit (empty before the first), the
     chain over the frames up to it, and the last tick whose deliveries are `final`.
 
     `supervisor` is the boot of the supervisor that it answers. A vHub that `waits` continues from a journal, and closes

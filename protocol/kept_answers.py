@@ -17,7 +17,7 @@ class KeptAnswers(dict[tuple[str, str], Answer]):
             self.keep(answer)
 
     def keep(self, answer: Answer) -> Answer:
-        """Add an answer and return it; the oldest one goes when there are too many."""
+        """Add an answer and return it; the oldest one is removed when there are too many."""
         self[answer.sender, answer.id] = answer
         if len(self) > self._most:
             self.pop(next(iter(self)))

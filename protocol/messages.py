@@ -22,15 +22,15 @@ from foosim.world.start import Origin
 
 
 class FormVersion(Item, frozen=True):
-    """The version of a form that is not foosim's own: `name` is its form, module and class."""
+    """The version of a form from another package: `name` is its form, module and class."""
 
     name: Annotated[str, Meta(max_length=limits.FORM_NAME_MAX)]
     version: Annotated[str, Meta(max_length=limits.FORM_NAME_MAX)]
 
 
 class FailedForm(Item, frozen=True):
-    """A form has raised: which `component` of which `entity` (empty of what is none's alone), at which tick, and the
-    end of its traceback."""
+    """A form has raised: the `component`, its `entity` (empty for one of the world), the tick and the end of the
+    traceback."""
 
     entity: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
     component: Text
@@ -167,7 +167,7 @@ class Hello(Message, frozen=True, tag="hello"):
 
 
 class Recall(Message, frozen=True):
-    """The supervisor of this `boot` does not know a member: a process that knows another supervisor sends its hello."""
+    """The supervisor of this `boot` misses a member: a process with another supervisor sends its hello."""
 
     boot: Name
 
@@ -200,7 +200,7 @@ class Ready(Message, frozen=True):
     """The process has built the layout with this digest; of the vHub, all declared lockstep clients have joined too.
 
     A node's `fingerprint` is the digest of a fixed short run of its engine: equal fingerprints compute equal worlds.
-    Its `forms` are the versions of the forms of the world that are not foosim's own.
+    Its `forms` are the versions of the forms of the world from other packages.
     """
 
     name: Name
@@ -232,7 +232,7 @@ class Tempo(Message, frozen=True):
 
 
 class End(Message, frozen=True):
-    """The run is over after `tick` ticks; `form` is the one that has raised, where that is why."""
+    """The run is over after `tick` ticks; `form` is the one whose error ended it, if any."""
 
     tick: Counter
     reason: Text

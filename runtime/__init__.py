@@ -3,4 +3,4 @@
 from typing import Final
 
 GC_THRESHOLDS: Final = (20_000, 20, 100)
-"""Of garbage collections, which are rare: what is loaded lives as long as the process."""
+"""Of garbage collections, which are rare: loaded modules live as long as the process."""

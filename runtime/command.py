@@ -145,7 +145,7 @@ def _run(app: typer.Typer, name: str, words: Sequence[str]) -> int:
 
 
 def _usage_text(error: typer.TyperException, name: str) -> str:
-    """Return what is wrong with the arguments, on one line: the command, typer's message, the nearest command."""
+    """Return the error of the arguments, on one line: the command, typer's message, the nearest command."""
     context: Any = getattr(error, "ctx", None)
     text = error.format_message()
     if text.startswith("Usage: "):

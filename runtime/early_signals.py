@@ -1,4 +1,4 @@
-"""Signals that come before a run can handle them: while `up` imports and prepares, which takes seconds.
+"""Signals before a run can handle them: while `up` imports and prepares, which takes seconds.
 
 Those that come while its command is imported are noted, and raised once it can print a result; it raises later ones at
 once. This module imports little, so that it is ready first.

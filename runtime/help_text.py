@@ -1,4 +1,4 @@
-"""The help of commands: usage as people write it, and whole summaries."""
+"""The help of commands: usage as typed, and whole summaries."""
 
 from __future__ import annotations
 

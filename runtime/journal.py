@@ -63,7 +63,7 @@ class JournalDamaged(JournalError):
 
 @dataclass(frozen=True, slots=True)
 class JournalStatistics:
-    """What a journal has written since it was opened, and how many of its files there are."""
+    """The counts of a journal since it was opened: its writes and files."""
 
     records: int
     bytes: int
@@ -175,7 +175,7 @@ def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
     """
     opening = b""
     torn: tuple[int, Records] | None = None
-    """The first file of that opening that has no end, and its number."""
+    """The first file of that opening without an end, and its number."""
     for serial, path in _numbered(folder, stem):
         records = read_records(path)
         head = records.head
@@ -257,7 +257,7 @@ class Journal:
         """Serial and last tick of files that are full, oldest first."""
         self._serial = max((serial for serial, _ in _numbered(folder, stem)), default=0)
         self._mutex = threading.Lock()
-        """Guards what the syncing thread shares: `_file`, `_retired`, what is dirty, `_syncs`."""
+        """Guards the data shared with the syncing thread: `_file`, `_retired`, dirty bytes, `_syncs`."""
         self._retired: list[int] = []
         self._dirty = self._folder_dirty = False
         self._file = self._size = 0

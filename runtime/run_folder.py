@@ -102,7 +102,7 @@ class RunFolder:
     def _take(self, name: str) -> int | None:
         """Lock a file of the folder until this process ends; None when another process has it."""
         lock = os.open(self.path / name, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        for _ in range(HOLD_TRIES):  # who looks whether it is locked has the lock for a moment, too
+        for _ in range(HOLD_TRIES):  # a test of the lock holds it for a moment, too
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -207,7 +207,7 @@ def create_run(world: str, name: str | None = None, stamp: str = "") -> RunFolde
         raise BadValue(f"--run: {NAME_RULE}", name)
     parent = runs_folder()
     if name is not None and (parent / name / LOGS).is_dir() and RunFolder(parent / name).is_fresh():
-        return RunFolder(parent / name)  # made for us, by who waits for the run
+        return RunFolder(parent / name)  # made for us by the process that waits for the run
     parent.mkdir(parents=True, exist_ok=True)
     _forget_old(parent)
     path = _make(parent, name or f"{world[:12]}-{stamp or wall_clock.now_stamp()}", is_free=name is None)

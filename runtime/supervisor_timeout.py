@@ -14,23 +14,23 @@ class SupervisorTimeout:
     """The time since the loss of the supervisor."""
 
     def __init__(self) -> None:
-        self._gone_ns: int | None = None
+        self._lost_ns: int | None = None
 
     @property
     def is_alone(self) -> bool:
         """Whether the supervisor is gone."""
-        return self._gone_ns is not None
+        return self._lost_ns is not None
 
     def hear(self, is_alive: bool, now_ns: int) -> None:
         """The presence of the supervisor has begun or ended."""
-        self._gone_ns = None if is_alive else now_ns
+        self._lost_ns = None if is_alive else now_ns
 
     def rest(self, stood_ns: int, now_ns: int) -> None:
         """Exclude a standstill of this process from the timeout."""
-        if self._gone_ns is not None:
-            self._gone_ns = min(now_ns, self._gone_ns + stood_ns)
+        if self._lost_ns is not None:
+            self._lost_ns = min(now_ns, self._lost_ns + stood_ns)
 
     def is_over(self, deployment: Deployment | None, now_ns: int) -> bool:
         """Whether the timeout has expired."""
         limit_ns = UNKNOWN_NS if deployment is None else deployment.deadlines.orphan_ns
-        return self._gone_ns is not None and now_ns - self._gone_ns >= limit_ns
+        return self._lost_ns is not None and now_ns - self._lost_ns >= limit_ns

@@ -35,7 +35,7 @@ class Notify:
         self._is_ready = self._is_stopping = False
 
     def ready(self, now_ns: int) -> None:
-        """Report that the process takes part in the run; the watchdog begins to supervise its loop."""
+        """Report that the process has joined the run; the watchdog begins to supervise its loop."""
         self._is_ready = True
         self._notify("READY=1")
         self.progress(now_ns)

@@ -490,7 +490,7 @@ class System:
 
     def _supervisor_sees_gone(self, name: str) -> None:
         if channels.SUPERVISOR in self.processes:
-            self.supervisor.process_gone(name, self.now_of(channels.SUPERVISOR))
+            self.supervisor.connection_closed(name, self.now_of(channels.SUPERVISOR))
             self.take_turn(self.processes[channels.SUPERVISOR])
 
     def _leave_hub(self) -> None:

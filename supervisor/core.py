@@ -59,7 +59,7 @@ from foosim.world.frame import Frame, chain_next
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class SupervisorCore:
-    """The supervisor's state machine. `actions` is what the shell performs next."""
+    """The supervisor's state machine. The shell performs its `actions` next."""
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class SupervisorCore:
         self.refusals = Refusals(state.actions.append, lambda: state.deployment)
         self.progress, self.closing = ProgressMonitor(state, now_ns), ClosingMonitor(state)
         self.viewing = Viewing(state)
-        self.handshake = Handshake(state, self.process_gone)
+        self.handshake = Handshake(state, self.connection_closed)
         self.vhub_loss, self.player_losses = VhubLoss(state, self.progress), PlayerLosses(state)
         self.node_loss = NodeLoss(state, self.open_epoch, self.fail)
         ends = self.fail, self.publish_last_commit
@@ -108,10 +108,10 @@ class SupervisorCore:
             self.failover.begin(history, now_ns)
         self.actions.append(Journal(encode(state.run_record) if history is None else state.checkpoint()))
 
-    # --- what the shell calls --------------------------------------------------------------------------------------
+    # --- calls of the shell ----------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message as it came; one that is not valid is counted and dropped."""
+        """Take one message as received; an invalid one is counted and dropped."""
         try:
             message = self.refusals.read(channel, name, payload, now_ns)
             reader = self._readers.get(type(message))
@@ -156,13 +156,13 @@ class SupervisorCore:
         self.failover.wake(now_ns)
         self._balance(now_ns)
         if state.lacks_inputs and self._retry.is_over(now_ns):
-            self._ask_again(now_ns)
+            self._request_missing(now_ns)
 
     @property
     def lacking(self) -> tuple[Channel, int]:
         """The channel, and how many messages of it, without which there is nothing to commit.
 
-        Commits wait for each other as long as nodes can continue without them, less a tick for what a commit takes.
+        Commits wait for each other as long as nodes can continue without them, less a tick for the time of a commit.
         """
         state = self.state
         inputs, tick = state.inputs, state.frame.tick
@@ -183,16 +183,16 @@ class SupervisorCore:
                 deadline = min(deadline, release_ns)
         return deadline
 
-    def process_gone(self, name: str, now_ns: int) -> None:
+    def connection_closed(self, name: str, now_ns: int) -> None:
         """The connection of a process has closed."""
         state = self.state
         process = state.roster.by_name.get(name)
         if process is None:
             return
-        process.gone_ns = now_ns
+        process.closed_ns = now_ns
         is_certain = not self.progress.doubts(process, now_ns)
         if is_certain and not process.farewell and not process.lost and state.end is None:
-            self._lose({name: closed(now_ns - process.heard_ns)}, now_ns)
+            self._lose({name: closed(now_ns - process.last_message_ns)}, now_ns)
 
     def on_standstill(self, stood_ns: int, now_ns: int) -> None:
         """Extend the deadlines of other processes by a standstill of the supervisor's own loop."""
@@ -224,7 +224,7 @@ class SupervisorCore:
         self.finish(reason, failed=True, tick=tick)
 
     def stop(self) -> int:
-        """End the run in order and return after which tick: what is released, or one more when all of it is committed.
+        """End the run in order and return its last tick: the released one, or one more when that is committed.
 
         The last commit is marked as the last, so that the vHub does not close its tick: no other may be.
         """
@@ -368,8 +368,8 @@ class SupervisorCore:
         else:
             self.actions.append(Publish(channels.COMMIT, channels.VHUB, payload))
 
-    def _ask_again(self, now_ns: int) -> None:
-        """Ask for what the next commit lacks, the wait doubling."""
+    def _request_missing(self, now_ns: int) -> None:
+        """Request the messages that the next commit lacks; the wait doubles."""
         state, tick = self.state, self.state.frame.tick
         wants: list[Want] = []
         if tick not in state.inputs.deliveries:
@@ -450,7 +450,7 @@ class SupervisorCore:
             self.node_loss.join(process, now_ns)
 
     def _on_heartbeat(self, heartbeat: Heartbeat, payload: bytes, now_ns: int) -> None:
-        """A process lives: a lost one may be back; send it again what it has missed."""
+        """A process lives: a lost one may be back; send it the missed messages again."""
         state, process = self.state, self.handshake.on_heartbeat(heartbeat, now_ns)
         if process is None:
             return

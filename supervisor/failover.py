@@ -2,9 +2,9 @@
 
 The state is restored from the journal. The other processes find the supervisor by the address that it had before, are
 recalled, and repeat hello and ready. The vHub reports its resume position with its last commit, which is the later one
-when the supervisor's machine was lost. Then a new epoch begins at the last commit, without the nodes that have not come
-in time, and the same ticks are computed again from the same inputs. A run whose vHub has lost inputs with its machine
-ends: these ticks cannot be computed again.
+when the supervisor's machine was lost. Then a new epoch begins at the last commit, without late nodes, and the same
+ticks are computed again from the same inputs. A run whose vHub has lost inputs with its machine ends: these
+ticks cannot be computed again.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class Failover:
     def wake(self, now_ns: int) -> None:
         """Begin the epoch when all processes are here, or when the deadline of the missing ones is over.
 
-        Where the vHub lacks inputs the run ends then, or as soon as it is known that somebody has lived on.
+        Where the vHub lacks inputs the run ends then, or as soon as a process is known to have survived.
         """
         state, deadlines = self._state, self._state.deployment.deadlines
         if not state.is_resuming or state.end is not None or state.finished:
@@ -148,7 +148,7 @@ class Failover:
             self._open(self._standing, here, [name for name in expected if name not in here], now_ns)
 
     def _is_ahead(self, standing: ResumeState) -> bool:
-        """Whether the vHub has commits that are not in the supervisor's journal."""
+        """Whether the vHub has commits beyond the supervisor's journal."""
         return bool(standing.commit) and decode(Commit, standing.commit).tick > self._state.frame.tick
 
     def _catch_up(self, standing: ResumeState) -> None:

@@ -18,10 +18,10 @@ from foosim.supervisor.state import RunState
 class Handshake:
     """Takes what processes report of themselves."""
 
-    def __init__(self, state: RunState, process_gone: Callable[[str, int], None]) -> None:
-        """`process_gone` takes the name of a process that has ended, and the time."""
+    def __init__(self, state: RunState, connection_closed: Callable[[str, int], None]) -> None:
+        """`connection_closed` takes the name of a process that has ended, and the time."""
         self._state = state
-        self._process_gone = process_gone
+        self._connection_closed = connection_closed
 
     def on_hello(self, hello: Hello, payload: bytes, now_ns: int) -> None:
         """Answer the hello of a process with a build or a refusal."""
@@ -38,7 +38,7 @@ class Handshake:
             return
         known = state.roster.by_name.get(hello.name)
         if known is not None and known.in_doubt and known.boot != hello.boot:
-            self._process_gone(hello.name, now_ns)  # there is no doubt left
+            self._connection_closed(hello.name, now_ns)  # there is no doubt left
         state.roster.take(hello, now_ns)
         run, pace = state.settings, str(state.pacer.pace)
         deployment = run.deployment_name, run.deployment_text
@@ -54,10 +54,10 @@ class Handshake:
         state = self._state
         process = state.roster.by_name.get(ready.name)
         is_known = process is not None and process.boot == ready.boot and ready.name not in state.roster.stopped
-        if process is None or not is_known or (process.lost and process.gone_ns):
+        if process is None or not is_known or (process.lost and process.closed_ns):
             state.repeated += 1
             return None
-        process.heard_ns = now_ns
+        process.last_message_ns = now_ns
         process.lost = False  # it may have been silent for too long while it was building
         if state.end is not None:
             state.publish_end()
@@ -69,8 +69,8 @@ class Handshake:
         return process
 
     def on_heartbeat(self, heartbeat: Heartbeat, now_ns: int) -> Process | None:
-        """Note that a process lives, and what it reports; recall one that takes part and has not sent a hello to this
-        supervisor. Return the process."""
+        """Note that a process lives, and its report; recall one of the run without a hello to this supervisor. Return
+        the process."""
         state = self._state
         process = state.roster.by_name.get(heartbeat.sender)
         if process is None:
@@ -79,9 +79,9 @@ class Handshake:
                 state.publish(channels.RECALL, channels.SUPERVISOR, Recall(state.boot))
             state.repeated += 1
             return None
-        process.heard_ns = now_ns
-        if not process.lost and now_ns > process.gone_ns + IN_FLIGHT_NS:
-            process.in_doubt, process.gone_ns = False, 0  # messages from before have come by then
+        process.last_message_ns = now_ns
+        if not process.lost and now_ns > process.closed_ns + IN_FLIGHT_NS:
+            process.in_doubt, process.closed_ns = False, 0  # messages from before have come by then
         return process
 
     def keep_report(self, process: Process, heartbeat: Heartbeat) -> None:

@@ -94,7 +94,7 @@ class Balancer:
         self._next_ns = 0
 
     def look(self, loads: Mapping[str, float], owners: Mapping[str, str], now_ns: int) -> Shift | None:
-        """Return what should move now, given the load of every node that takes part; None for nothing."""
+        """Return the next move, given the load of every node of the run; None without one."""
         if now_ns < self._next_ns or len(loads) < 2:
             return None
         self._next_ns = now_ns + EVERY_NS

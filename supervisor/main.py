@@ -1,8 +1,8 @@
 """The process `foosim run`: the supervisor's core as the router of the simulation plane.
 
-It holds the run's folder: the run file has the run's addresses, the journal has what was decided, and at the end
-`result.json` has how it ended. Started again in the folder of a run that has not ended, it listens where it listened
-and continues from the journal.
+It holds the run's folder: the run file has the run's addresses, the journal its decisions, and `result.json` at the end
+its result. Started again in the folder of an unfinished run, it listens at the same addresses and continues from the
+journal.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from foosim.supervisor.records import History, fold
 from foosim.supervisor.settings import RunSettings
 
 LOOK_NS: Final = 1_000_000_000
-"""How often the free space of the journal's disk is looked at."""
+"""The period of reading the free space of the journal's disk."""
 
 
 class JournalRoom:
@@ -199,7 +199,7 @@ class SupervisorShell:
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         if plane is Plane.SIMULATION and not is_alive:
-            self.core.process_gone(name, time.monotonic_ns())
+            self.core.connection_closed(name, time.monotonic_ns())
 
 
 def serve(

@@ -1,4 +1,4 @@
-"""Loss, stop and return of nodes: the epoch that follows, and who owns which robot in it.
+"""Loss, stop and return of nodes: the next epoch, and the owner of each robot in it.
 
 A run that loses a node continues from its last commit with a new epoch. The remaining members
 adopt the robots of the lost node and give them back when it returns. Without any node the run waits.
@@ -80,7 +80,7 @@ class NodeLoss:
         process = state.roster.by_name.get(name)
         if process is not None:
             state.roster.lose(process)
-            process.gone_ns = now_ns  # also when the node is started again, this process is not
+            process.closed_ns = now_ns  # also when the node is started again, this process is not
             state.actions += refuse(process.role, name, process.boot, "stopped by request")
 
     def join(self, process: Process, now_ns: int) -> None:
@@ -108,7 +108,7 @@ class NodeLoss:
         Then it joins again, if it had built the world and its arithmetic was compared.
         """
         state = self._state
-        if not state.is_open and now_ns > process.gone_ns + IN_FLIGHT_NS:
+        if not state.is_open and now_ns > process.closed_ns + IN_FLIGHT_NS:
             process.lost = False  # its connection was cut; it repeats that it is ready until it gets an epoch
         runs = state.is_open and state.end is None
         if runs and not state.members and process.ready and process.name not in state.roster.stopped:

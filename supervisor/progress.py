@@ -21,7 +21,7 @@ from foosim.supervisor.state import RunState
 DOUBT_NS: Final = 1_000_000_000
 """After a standstill of the supervisor, connections that it kept silent end within this time."""
 CUT_SEEN_NS: Final = 1_500_000_000
-"""By then the connection of a process that is cut off has closed: a lease, and what it takes to notice its end."""
+"""By then the connection of a cut-off process has closed: a lease, and the time to notice its end."""
 LATE_EVERY_NS: Final = 1_000_000_000
 """How often late ticks are logged at most."""
 
@@ -52,7 +52,7 @@ class ProgressMonitor:
         self._late_by: dict[int, str] = {}
         """By tick: which process its deliveries waited for, as the vHub reported."""
 
-    # --- what came when ----------------------------------------------------------------------------------------------
+    # --- arrivals ----------------------------------------------------------------------------------------------------
 
     def took(self, begun_ns: int, ended_ns: int) -> None:
         """Count a turn of the supervisor as its own busy time."""
@@ -65,7 +65,7 @@ class ProgressMonitor:
     def on_standstill(self, stood_ns: int, now_ns: int) -> None:
         """Extend the deadlines of other processes by a standstill of the supervisor's own loop."""
         for process in self._state.roster.by_name.values():
-            process.heard_ns = min(now_ns, process.heard_ns + stood_ns)
+            process.last_message_ns = min(now_ns, process.last_message_ns + stood_ns)
         self._begun_ns = min(now_ns, self._begun_ns + stood_ns)
         self._progress_ns = min(now_ns, self._progress_ns + stood_ns)
         if stood_ns >= REPORTED_NS:
@@ -100,7 +100,7 @@ class ProgressMonitor:
         self._parts.setdefault(tick, {})[node] = now_ns - self._busy_ns
 
     def committed(self, frame_tick: int, lag_ns: int, due_ns: int, now_ns: int) -> str:
-        """A frame is committed, of a tick that was due to be released at `due_ns`; return what is to be logged."""
+        """A frame is committed, of a tick whose release was due at `due_ns`; return the lines to log."""
         if lag_ns > self._lag_ns:
             self.late = self._waited_for(frame_tick - 1, due_ns, now_ns)
             self.late_tick = frame_tick
@@ -135,7 +135,7 @@ class ProgressMonitor:
             spans[node] = spans.get(node, 0) + came - max(released, delivered)
         return max(sorted(spans), key=lambda name: spans[name])
 
-    # --- who is waited for -------------------------------------------------------------------------------------------
+    # --- the process that the run waits for --------------------------------------------------------------------------
 
     def waiting_for(self) -> list[str]:
         """Return the processes and lockstep clients that are waited for, in name order."""
@@ -250,8 +250,8 @@ class ClosingMonitor:
         account = hub.report.get("recording"), hub.report.get("disk_progress")
         if account != self._account:
             self._account, self._progress_ns = account, now_ns
-        silent_ns = now_ns - max(hub.gone_ns, hub.heard_ns)
-        if hub.gone_ns and silent_ns > deadlines.heartbeat_ns and not hub.in_doubt:
+        silent_ns = now_ns - max(hub.closed_ns, hub.last_message_ns)
+        if hub.closed_ns and silent_ns > deadlines.heartbeat_ns and not hub.in_doubt:
             self._cut_off(hub, "its vHub ended before it was closed")
             return True
         if now_ns > max(self._progress_ns, self._ended_ns) + deadlines.close_ns:

@@ -1,7 +1,7 @@
 """The records of the supervisor's journal, the account of a run, and the fold of a journal.
 
 Each record is written before its message is published. A fold gives everything that a restarted supervisor needs: the
-last committed frames, the epoch, the edits of ticks that are not committed, answers, pace, and the account. What
+last committed frames, the epoch, the edits of later ticks, answers, pace, and the account. What
 belongs together is one record, so that a journal never ends between a request and its effect.
 """
 
@@ -43,10 +43,10 @@ class Account:
     handovers: int = 0
     moves: int = 0
     solvers: dict[str, str] = field(default_factory=dict)
-    """Who solved each free body on the way to the last frame, by the body's name."""
+    """The solver of each free body for the last frame, by the body's name."""
 
     def count(self, solved: Iterable[str], solvers: dict[str, str]) -> None:
-        """Count a committed frame: the nodes that solved a body for it, and who solved each free body."""
+        """Count a committed frame: the nodes that solved a body for it, and the solver of each free body."""
         for name in solved:
             self.solved_ticks[name] = self.solved_ticks.get(name, 0) + 1
         for name, solver in solvers.items():
@@ -123,7 +123,7 @@ class Control(msgspec.Struct, frozen=True, array_like=True, tag="control", forbi
     disruptions: int = 0
 
 
-class Asked(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class RequestSummary(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A request that changes something, with the tick and text of its answer."""
 
     tick: int
@@ -133,13 +133,13 @@ class Asked(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
     accepted: bool
 
 
-ASKED_KEPT: Final = 32
-ASKED_TEXT_MAX: Final = 200
+REQUESTS_KEPT: Final = 32
+SUMMARY_TEXT_MAX: Final = 200
 
 
-def asked(verb: str, answer: Answer) -> Asked:
-    """Return what is kept of a request, for people."""
-    return Asked(answer.tick, verb, answer.text[:ASKED_TEXT_MAX], answer.sender, answer.accepted)
+def summary_of(verb: str, answer: Answer) -> RequestSummary:
+    """Return the part of a request that is kept for people."""
+    return RequestSummary(answer.tick, verb, answer.text[:SUMMARY_TEXT_MAX], answer.sender, answer.accepted)
 
 
 class RequestRecord(msgspec.Struct, frozen=True, array_like=True, tag="request", forbid_unknown_fields=True):
@@ -201,7 +201,7 @@ class Checkpoint(msgspec.Struct, frozen=True, array_like=True, tag="head", forbi
     committed_ns: int
     end: End | None
     disruptions: list[tuple[int, str]] = []
-    asked: list[Asked] = []
+    requests: list[RequestSummary] = []
 
 
 Change = RequestRecord | OrderedRecord | Control | CommitRecord | RecoveredRecord | Epoch | End
@@ -214,7 +214,7 @@ class History:
 
     run: RunRecord
     frame: Frame
-    """The last committed one; that of the start while none is."""
+    """The last committed one, at first that of the start."""
     owners: dict[str, str]
     control: Control
     account: Account
@@ -223,7 +223,7 @@ class History:
     """The last ones, by tick, as they were published."""
     chain: bytes = CHAIN_START
     edits: dict[int, list[Edit]] = field(default_factory=dict)
-    """Edits of ticks that are not committed yet."""
+    """Edits of uncommitted ticks."""
     answers: KeptAnswers = field(default_factory=lambda: KeptAnswers(ANSWERS_KEPT))
     """By sender and id of the request."""
     lags: Lags = field(default_factory=Lags)
@@ -233,17 +233,17 @@ class History:
     end: End | None = None
     disruptions: list[tuple[int, str]] = field(default_factory=list)
     """The last network events that were requested: the tick at which each takes effect, the event as JSON."""
-    asked: list[Asked] = field(default_factory=list)
+    requests: list[RequestSummary] = field(default_factory=list)
     """The last requests that change something."""
 
 
 Solved = tuple[list[str], dict[str, str]]
-"""The nodes that solved a body on the way to a frame, and who solved each free body, by its name."""
+"""The nodes that solved a body for a frame, and the solver of each free body, by its name."""
 
 
 def solved_by(barrier: Barrier, layout: Layout, absent: Collection[int]) -> Solved:
-    """Return the nodes that solved a body on the way to a frame, and who solved each free body; `absent` has the
-    indices of who is not there."""
+    """Return the nodes that solved a body for a frame, and the solver of each free body; `absent` has the indices of
+    absent entities."""
     entities = layout.entities
     solving = [
         name
@@ -304,7 +304,7 @@ def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
         committed_ns=first.committed_ns,
         end=first.end,
         disruptions=list(first.disruptions),
-        asked=list(first.asked),
+        requests=list(first.requests),
     )
 
 
@@ -319,7 +319,7 @@ def _apply(history: History, record: Change) -> None:
         history.epoch, history.owners = record, owners
     elif isinstance(record, RequestRecord):
         history.answers.keep(record.answer)
-        history.asked = [*history.asked, asked(record.verb, record.answer)][-ASKED_KEPT:]
+        history.requests = [*history.requests, summary_of(record.verb, record.answer)][-REQUESTS_KEPT:]
         history.control, history.owners = record.control, record.owners
         _order(history, record)
     elif isinstance(record, OrderedRecord):

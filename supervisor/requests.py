@@ -24,7 +24,7 @@ from foosim.protocol import channels
 from foosim.protocol.messages import Answer, Inquiry, Request
 from foosim.supervisor.load_balancing import WORTH, loads_of, shifts_at_once
 from foosim.supervisor.node_loss import NodeLoss
-from foosim.supervisor.records import RequestRecord, asked
+from foosim.supervisor.records import RequestRecord, summary_of
 from foosim.supervisor.state import RunState
 from foosim.supervisor.viewing import Viewing, chosen
 from foosim.world.assembly.world import body_of
@@ -91,7 +91,7 @@ class Requests:
             self._reply(answer)
 
     def on_inquiry(self, inquiry: Inquiry, payload: bytes, now_ns: int) -> None:
-        """Answer a viewer, who may only read."""
+        """Answer a viewer, which may only read."""
         if inquiry.verb in READS:
             answer = self._decide(inquiry, now_ns)
             assert answer is not None, inquiry.verb
@@ -113,7 +113,7 @@ class Requests:
                 raise Refused("the run has not started yet")
             arguments = decode_json(request.arguments)
             if not isinstance(arguments, dict):
-                raise Malformed("arguments that are no JSON object")
+                raise Malformed("arguments must be a JSON object")
             return verb(request, arguments, now_ns)
         except Refused as refused:
             return self._refuse(request, str(refused))
@@ -129,9 +129,9 @@ class Requests:
         return self._write(request.verb, answer, answer.tick, [], self._state.owners)
 
     def _write(self, verb: str, answer: Answer, tick: int, edits: list[Edit], owners: dict[str, str]) -> Answer:
-        """Journal an answer and what is added to the order of `tick`; keep it for when the request is repeated."""
+        """Journal an answer and its additions to the order of `tick`; keep it for a repeated request."""
         self._state.journal(RequestRecord(tick, edits, answer, self._state.control(), owners, verb))
-        self._state.asked.append(asked(verb, answer))
+        self._state.last_requests.append(summary_of(verb, answer))
         self._state.answers.keep(answer)
         return answer
 
@@ -146,7 +146,7 @@ class Requests:
     ) -> Answer:
         """Journal a request whose tick is chosen, with its whole effect, and keep its answer.
 
-        `effective` is the tick that the answer names, where that is not the one whose order has the edits.
+        `effective` is the tick that the answer names, where its order is another than that with the edits.
         """
         answer = Answer(request.sender, request.id, True, tick if effective is None else effective, text, b"{}")
         self._write(request.verb, answer, tick, edits or [], owners or self._state.owners)
@@ -239,7 +239,7 @@ class Requests:
         return self._accept(request, tick, f"{name} pushed at tick {tick}", [Push(name, impulse)])
 
     def _set(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Set a field of an entity, whose numbers follow from the newest frame and what is ordered since."""
+        """Set a field of an entity, whose numbers follow from the newest frame and the orders since."""
         state, field = self._state, _name(arguments, "field")
         layout, numbers = state.frame.layout, state.coming_numbers()
         entity = layout[chosen("entity", _name(arguments, "name"), layout.names)]
@@ -255,7 +255,7 @@ class Requests:
         return self._accept(request, tick, f"{field} of {entity.name} set at tick {tick}", [*edits])
 
     def _tick_for_edit(self) -> int:
-        """Return the first tick that is not released; raises Refused when its order is full."""
+        """Return the first unreleased tick; raises Refused when its order is full."""
         tick = self._state.released
         if len(self._state.coming_edits.get(tick, ())) >= EDITS_MAX:
             raise Refused(f"tick {tick} has {len(self._state.coming_edits[tick])} edits already")

@@ -31,7 +31,7 @@ ROLES: Final[tuple[str, ...]] = ("node", "vhub")
 
 @dataclass
 class Process:
-    """One process that takes part."""
+    """One process of the run."""
 
     role: str
     name: str
@@ -40,11 +40,11 @@ class Process:
     """Whether it has built the world."""
     arithmetic: bytes = b""
     """A node's digest of a fixed small run of its engine, once it has one."""
-    heard_ns: int = 0
+    last_message_ns: int = 0
     heartbeat: Heartbeat | None = None
     report: dict[str, Any] = field(default_factory=dict)
     farewell: bool = False
-    gone_ns: int = 0
+    closed_ns: int = 0
     in_doubt: bool = False
     """Its connection has ended, possibly by a standstill of the supervisor."""
     lost: bool = False
@@ -62,7 +62,7 @@ class Roster:
         self.starts: dict[str, int] = {}
         """Number of start requests by node; a launcher that sees it grow starts the node's process."""
         self.hub_account: dict[str, Any] = {}
-        """The last report of a vHub that had its state: one that is started again has none before it has read it."""
+        """The last report of a vHub with its state: a restarted one has none before it has read it."""
         self._fingerprint = fingerprint
         self._simulation = b""
 
@@ -106,17 +106,17 @@ class Roster:
         """Whether another process of this name takes part and has missed some heartbeats: it may be gone."""
         known = self.by_name.get(hello.name)
         is_other = known is not None and known.boot != hello.boot and not known.lost
-        return known is not None and is_other and now_ns - known.heard_ns > SILENT_NS
+        return known is not None and is_other and now_ns - known.last_message_ns > SILENT_NS
 
     def take(self, hello: Hello, now_ns: int) -> Process:
-        """Note a process whose hello was accepted; one that was lost begins anew."""
+        """Note a process whose hello was accepted; a lost one begins anew."""
         known = self.by_name.get(hello.name)
         if known is None or known.lost:
-            known = self.by_name[hello.name] = Process(hello.role, hello.name, hello.boot, heard_ns=now_ns)
+            known = self.by_name[hello.name] = Process(hello.role, hello.name, hello.boot, last_message_ns=now_ns)
         return known
 
     def hear(self, process: Process, report: dict[str, Any]) -> None:
-        """Note what a process reports of itself."""
+        """Note the report of a process."""
         process.report = report
         if process.name == VHUB and "packets" in report:
             self.hub_account = report
@@ -158,7 +158,7 @@ class Roster:
         return ""
 
     def missing(self) -> list[str]:
-        """Return the declared processes that are not ready yet."""
+        """Return the declared processes that are still to be ready."""
         here = {name for name, process in self.by_name.items() if not process.lost and process.ready}
         return [name for name in self.expected if name not in here]
 
@@ -167,7 +167,7 @@ class Roster:
         return [
             name
             for name, process in sorted(self.by_name.items())
-            if now_ns - process.heard_ns > deadline_ns and not process.farewell and not process.lost
+            if now_ns - process.last_message_ns > deadline_ns and not process.farewell and not process.lost
         ]
 
 

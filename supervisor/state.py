@@ -26,16 +26,16 @@ from foosim.protocol.messages import Commit, Deliveries, End, Epoch, Part, Tempo
 from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.records import (
     ANSWERS_KEPT,
-    ASKED_KEPT,
     DISRUPTIONS_KEPT,
+    REQUESTS_KEPT,
     Account,
-    Asked,
     Checkpoint,
     Control,
     History,
     OrderedRecord,
     Recovered,
     RecoveredRecord,
+    RequestSummary,
     RunRecord,
     disruptions_of,
 )
@@ -49,7 +49,7 @@ from foosim.world.setting.scheduled import Schedule
 
 
 class InputBuffer:
-    """Parts of nodes and deliveries of the vHub for ticks that are not committed."""
+    """Parts of nodes and deliveries of the vHub for uncommitted ticks."""
 
     def __init__(self) -> None:
         self.parts: dict[int, list[Part]] = {}
@@ -77,7 +77,7 @@ class InputBuffer:
         return True
 
     def take_deliveries(self, deliveries: Deliveries, payload: bytes, committed: int) -> bool:
-        """Take deliveries as they came; False for a repeat. Raises Malformed for a tick too far ahead."""
+        """Take received deliveries; False for a repeat. Raises Malformed for a tick too far ahead."""
         if deliveries.tick in self.deliveries or deliveries.tick < committed:
             return False
         if deliveries.last > committed + limits.KEPT_TICKS:
@@ -109,7 +109,7 @@ class RunState:
     busy: float = 0.0
     """The share of its time in which the supervisor's loop does not sleep."""
     repeated: int = 0
-    """Messages that came twice, or of a process that does not take part any more."""
+    """Repeated messages, and messages of a former process."""
     epoch: int = 0
     epoch_payload: bytes = b""
     """The epoch as it was published."""
@@ -141,7 +141,7 @@ class RunState:
         """`boot` names this start of the supervisor, `clock` the monotonic clock of its times."""
         self.settings, self.boot, self.clock = settings, boot, clock
         self.actions: list[Action] = []
-        """What the shell performs next."""
+        """The next actions of the shell."""
         self.deployment = settings.load_deployment()
         self._events = Schedule(self.deployment)
         text = settings.deployment_name, settings.deployment_text
@@ -161,10 +161,10 @@ class RunState:
         self.commits: dict[int, bytes] = {}
         """The last ones, as they were published."""
         self.coming_edits: dict[int, list[Edit]] = {}
-        """Edits of ticks that are not released yet."""
+        """Edits of unreleased ticks."""
         self.answers = KeptAnswers(ANSWERS_KEPT)
         """By sender and id of the request."""
-        self.asked: deque[Asked] = deque(maxlen=ASKED_KEPT)
+        self.last_requests: deque[RequestSummary] = deque(maxlen=REQUESTS_KEPT)
         """The last requests that change something, for people."""
         self.last_disruptions: deque[tuple[int, str]] = deque(maxlen=DISRUPTIONS_KEPT)
         """The last of them: the tick at which each takes effect, the event as JSON."""
@@ -267,7 +267,7 @@ class RunState:
         return {name: node for name, node in self.owners.items() if not frame.layout[name].is_absent(frame.numbers)}
 
     def order(self, tick: int, edits: list[Edit]) -> None:
-        """Add edits of the supervisor's own to the order of a tick that is not committed.
+        """Add edits of the supervisor's own to the order of an uncommitted tick.
 
         The epoch that follows publishes again the orders that were released.
         """
@@ -315,7 +315,7 @@ class RunState:
     # --- checkpoint, restore, catch up -------------------------------------------------------------------------------
 
     def control(self) -> Control:
-        """Return what people have set, for the journal."""
+        """Return the settings by requests, for the journal."""
         pacer, roster = self.pacer, self.roster
         people = sorted(roster.stopped), dict(self.returns), dict(roster.starts)
         return Control(str(pacer.pace), pacer.paused, pacer.granted, self.stop_at, *people, self.disruptions)
@@ -339,12 +339,12 @@ class RunState:
             self.committed_ns,
             self.end,
             list(self.last_disruptions),
-            list(self.asked),
+            list(self.last_requests),
         )
         return encode(checkpoint)
 
     def restore(self, history: History) -> None:
-        """Put the state of a run that has not begun where a journal ends, before an epoch."""
+        """Restore the state at the end of a journal, before an epoch."""
         self.frame, self.chain = history.frame, history.chain
         self.released = self.frame.tick
         self.inputs.reset(self.frame.tick)
@@ -360,7 +360,7 @@ class RunState:
         self.roster.stopped, self.roster.starts = set(control.stopped), dict(control.starts)
         self.recovered, self.returns = history.recovered, dict(control.returns)
         self.restore_requests(history)
-        self.asked.extend(history.asked)
+        self.last_requests.extend(history.requests)
 
     def restore_requests(self, history: History) -> None:
         """Restore the effects of requests, and the last answers."""

@@ -36,7 +36,7 @@ DISRUPTIONS_SHOWN: Final = 16
 
 
 def in_quarantine(frame: Frame) -> list[str]:
-    """Return the entities of a frame that are not solved, by name."""
+    """Return the names of the entities in quarantine."""
     marked = [(entity.name, entity.offsets.get("quarantined", -1)) for entity in frame.layout.entities]
     return [name for name, at in marked if at >= 0 and frame.numbers[at] > 0.0]
 
@@ -113,10 +113,10 @@ def status(
         "links": report.get("links", []),
         "links_in_all": report.get("links_in_all", 0),
         "disruptions": {
-            "asked": state.disruptions,
+            "count": state.disruptions,
             "last": [{"tick": tick, "event": decode_json(text.encode())} for tick, text in state.last_disruptions],
         },
-        "requests": [asdict(asked) for asked in state.asked],
+        "requests": [asdict(request) for request in state.last_requests],
         "refusals": report.get("refusals", {}),
         "clients": report.get("clients", []),
         "watched": report.get("watched", {}),
@@ -124,7 +124,7 @@ def status(
 
 
 def _recoveries(state: RunState) -> list[dict[str, object]]:
-    """Return the losses and returns of the account; an outage that is not over is null."""
+    """Return the losses and returns of the account; the time of a lasting outage is null."""
     return [
         {
             "what": entry.what,

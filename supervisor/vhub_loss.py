@@ -42,7 +42,7 @@ class VhubLoss:
         if state.is_vhub_away:
             return
         self._since_ns, self._reason, self._lost_at = now_ns, reason, (state.epoch, state.frame.tick)
-        if not state.is_open:  # the run waits for it as for any process that has not come yet
+        if not state.is_open:  # the run waits for it as for any missing process
             state.log("warning", f"lost the vHub: {reason}; the run has not started, and waits for it")
             return
         heartbeat = None if process is None else process.heartbeat
@@ -57,14 +57,14 @@ class VhubLoss:
     def on_heartbeat(self, process: Process, now_ns: int) -> None:
         """A lost vHub sends a heartbeat: it is back, unless that predates its loss or its tick does not advance."""
         state, heartbeat = self._state, process.heartbeat
-        goes_on = self._tick < 0 or (heartbeat is not None and heartbeat.tick > self._tick)
-        if state.end is None and goes_on and now_ns > max(self._since_ns, process.gone_ns) + IN_FLIGHT_NS:
+        advances = self._tick < 0 or (heartbeat is not None and heartbeat.tick > self._tick)
+        if state.end is None and advances and now_ns > max(self._since_ns, process.closed_ns) + IN_FLIGHT_NS:
             process.lost = False
             if state.is_open:  # else it repeats that it is ready, until it gets an epoch
                 self.on_ready(now_ns)
 
     def on_ready(self, now_ns: int) -> None:
-        """The vHub takes part: send it the epoch and the pace."""
+        """The vHub is ready: send it the epoch and the pace."""
         state = self._state
         state.publish_epoch()
         state.publish_tempo()
@@ -102,7 +102,7 @@ class VhubLoss:
 class PlayerLosses:
     """Adds to the account which players were away, as the vHub reports it.
 
-    Its heartbeats have the players that are away, and numbered what is over; a vHub that was started again reports from
+    Its heartbeats have the players that are away, and numbered past absences; a restarted vHub reports from
     its journal once more what the one before did.
     """
 
@@ -110,7 +110,7 @@ class PlayerLosses:
         self._state = state
         self._boot = ""
         """The start of the vHub that has reported last."""
-        self._heard = 0
+        self._last_number = 0
         """The number of its last entry."""
         self._known: Counter[tuple[str, str, str, int]] = Counter()
         """The account when this supervisor first heard of this start of the vHub, which reports that once more."""
@@ -119,20 +119,20 @@ class PlayerLosses:
         self._open: list[tuple[Recovered, int]] = []
 
     def on_report(self, hub: Process) -> None:
-        """Add the new entries of a vHub's report; those that the journal has are not new."""
+        """Add the entries of a vHub's report that the journal lacks."""
         state, absences = self._state, hub.report.get("absences")
         if absences is None or not state.is_open or state.end is not None:
             return
         if absences["boot"] != hub.boot:
             return  # a late report of a vHub before this one
         if hub.boot != self._boot:
-            self._boot, self._heard = hub.boot, 0
+            self._boot, self._last_number = hub.boot, 0
             self._known = Counter((entry.what, entry.name, entry.reason, entry.tick) for entry in state.recovered)
         gaps_ns, self._gaps_ns = self._gaps_ns, {name: self._gaps_ns.get(name, 0) for name in absences["away"]}
         for number, what, name, reason, tick in absences["over"]:
-            if number <= self._heard:
+            if number <= self._last_number:
                 continue
-            self._heard = number
+            self._last_number = number
             if self._known[what, name, reason, tick] > 0:
                 self._known[what, name, reason, tick] -= 1
                 continue

@@ -82,7 +82,7 @@ class Viewing:
         return self._answer(request, {"hz": got, "lease_s": LEASE_NS / _NS_PER_S})
 
     def describe(self, request: Request, arguments: dict[str, Any], now_ns: int) -> Answer:
-        """Answer with deployment, owners and layout: what a viewer needs to read the frames."""
+        """Answer with deployment, owners and layout, by which a viewer reads the frames."""
         state, run = self._state, self._state.settings
         commit = self._last_commit
         has_frame = 0 < len(commit) <= FRAME_BYTES_MAX
@@ -101,7 +101,7 @@ class Viewing:
         return self._answer(request, what)
 
     def committed(self, payload: bytes, edits: Sequence[Edit], now_ns: int) -> None:
-        """Publish a commit when it is due, or when something comes or goes with it."""
+        """Publish a commit when it is due, or when an entity is added or removed with it."""
         self._unseen = payload
         if now_ns >= self._due_ns or any(isinstance(edit, Add | Remove) for edit in edits):
             self._show(now_ns)
@@ -160,14 +160,14 @@ class Viewing:
             chosen("endpoint", name, ends)
 
     def _reading(self, robot: str, channel: str) -> None:
-        """Raise Refused for a channel that is no sensor of the robot."""
+        """Raise Refused for a channel other than the robot's sensors."""
         robots = self._state.deployment.robots
         sensors = robots[chosen("robot", robot, sorted(robots))].sensors
         chosen(f"sensor of {robot}", channel, sorted(sensors))
 
     @property
     def _last_commit(self) -> bytes:
-        """The last commit as it was published; empty before the first."""
+        """The last published commit; empty before the first."""
         return self._state.commits.get(self._state.frame.tick, b"")
 
     def _set_rate(self) -> None:
@@ -201,7 +201,7 @@ def _watched_by(leases: Iterable[_Lease]) -> Watched:
         readings.update(lease.readings)
     for what, pairs in (("links", links), ("readings", readings)):
         if len(pairs) > limits.WATCHED_MAX:
-            raise Refused(f"{what}: at most {limits.WATCHED_MAX} are looked at at once, these would make {len(pairs)}")
+            raise Refused(f"{what}: at most {limits.WATCHED_MAX} can be watched at once, these would be {len(pairs)}")
     return Watched(sorted(links), sorted(readings))
 
 
@@ -220,7 +220,7 @@ def _pairs(what: str, value: object, check: Callable[[str, str], None]) -> list[
 
 
 def chosen(what: str, name: str, choices: Sequence[str]) -> str:
-    """Return the name; raises Refused, with the choices, when it is none of them."""
+    """Return the name; raises Refused, with the choices, for another one."""
     if name in choices:
         return name
     nearest = nearest_name(name, choices)

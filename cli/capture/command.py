@@ -57,7 +57,7 @@ def _describe(found: CaptureInfo) -> str:
     elif found.finished:
         state = "whole, of a run that failed" if FAILED_RUN in found.end else "finished"
     else:
-        state = f"not finished, {found.unfinished_bytes} bytes behind the last whole chunk"
+        state = f"not finished, {found.unfinished_bytes} bytes after the last whole chunk"
     lines = [
         f"{found.path}: {found.bytes / 1e6:.1f} MB, {state}",
         *([f"  {len(found.parts)} files: {found.parts[0]} to {found.parts[-1]}"] if len(found.parts) > 1 else []),
@@ -155,7 +155,7 @@ def _verdict(found: Verified) -> str:
     on = f"on {found.nodes} node{'s' if found.nodes > 1 else ''}"
     if found.equal:
         count = found.ticks - found.first_tick
-        since = f" behind frame {found.first_tick}" if found.first_tick else ""
+        since = f" after frame {found.first_tick}" if found.first_tick else ""
         end = "" if found.finished else f"; the capture is unfinished, it ends at tick {found.ticks}"
         return f"equal: {count} ticks{since} simulated again {on}, digest of all ticks {found.chain.hex()}{end}"
     if found.missing_tick >= 0:

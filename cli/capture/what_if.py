@@ -78,7 +78,7 @@ def what_if(
 
 
 def _deployment(capture: CaptureData, network: Path | None, settings: list[str]) -> Deployment:
-    """Return the capture's deployment with what is asked for; its world stays."""
+    """Return the capture's deployment with other settings of its network; its world stays."""
     for setting in settings:
         if not setting.startswith("network.") and not (setting.startswith("scenery.") and ".radio" in setting):
             problem = "not a setting of the network: network.KEY=VALUE, or scenery.NAME.radio=MATERIAL"
@@ -121,7 +121,7 @@ def _show_links(found: WhatIf) -> None:
 
 
 def _show_ages(found: WhatIf) -> None:
-    """Show how old channels are when their receivers act: what a controller feels of the network."""
+    """Show the ages of channels when their receivers act: the effect of the network on a controller."""
     if not found.ages:
         return
     table = Table(box=None, header_style="bold", pad_edge=False)
@@ -139,7 +139,7 @@ def _show_ages(found: WhatIf) -> None:
 
 
 def _weight(link: LinkChange) -> tuple[float, str, str]:
-    """Return the place of a link: what changed most comes first."""
+    """Return the sort key of a link: the greatest change comes first."""
     change = abs(link.after.delivered - link.before.delivered) + abs(link.after.age_ms - link.before.age_ms)
     return -change, link.source, link.destination
 

@@ -1,4 +1,4 @@
-"""The command `foosim match`: many games of two players, in several processes, and what they show."""
+"""The command `foosim match`: many games of two players, in several processes, and their statistics."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from foosim.simulation.workers import in_processes
 
 TABLE: Final = Path("deploy/table.yaml")
 SIDES: Final = {"a": (0,), "b": (1,), "both": (0, 1)}
-"""Who of the two has the worse network."""
+"""The player with the worse network."""
 CELLS_MAX: Final = 400
 
 app = new_app()
@@ -39,7 +39,7 @@ app = new_app()
 
 @dataclass(frozen=True, slots=True)
 class MatchOptions:
-    """What a match is asked for; each field is an argument or option of the command."""
+    """The settings of a match; each field is an argument or option of the command."""
 
     a: Annotated[str, typer.Argument(metavar="A", help="keeper, passive, striker, team, or module:Class.")]
     b: Annotated[str, typer.Argument(metavar="B", help="The other player, likewise.")]
@@ -76,7 +76,7 @@ def foosim_match(
     options: MatchOptions,
     json: JsonOption = False,
 ) -> None:
-    """Let two players play many games, and show who is better.
+    """Let two players play many games, and show which is better.
 
     Each game is a rehearsal of the deployment with the classes A and B in the places of its two players, and with a
     seed of its own; in every second game they change sides. Prints wins, points, and how often what is played with
@@ -86,7 +86,7 @@ def foosim_match(
     With --delay or --loss there is a row for each pair of both, of the same seeds: the links to and from A
     (--worse-for) have that delay and loss in place of the deployed ones, B keeps its network. --picture draws the rows.
 
-    Ctrl-C ends the match with what has been played.
+    Ctrl-C ends the match with the games so far.
 
     Exit codes: 0 done, 1 a player has failed, 2 bad input, 3 a capture exists or cannot be written, 130 Ctrl-C.
     """
@@ -96,7 +96,7 @@ def foosim_match(
 
 
 def _checked(options: MatchOptions) -> Match:
-    """Return the match that was asked for; raises Refused. Nothing has been played, and no file made."""
+    """Return the match of the options; raises Refused, before any game and any file."""
     drawing, name = options.drawing, str(options.deployment)
     if drawing is not None:
         if options.delay is None and options.loss is None:

@@ -16,7 +16,7 @@ from foosim.simulation.match.game import Entrant, Fixture, Game, Link, Played
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """A checked match: who plays, the games in their order, and how they are shown."""
+    """A checked match: its players, the games in their order, and the form of the output."""
 
     entrants: tuple[Entrant, Entrant]
     fixture: Fixture
@@ -81,16 +81,16 @@ def show(match: Match, cells: Sequence[tuple[Link | None, Figures]]) -> None:
         table.add_row(
             *(() if link is None else (link.text,)),
             *(str(count) for count in (found.won, found.drawn, found.lost)),
-            "-" if found.wins is None else _told(found.wins),
+            "-" if found.wins is None else _interval_text(found.wins),
             f"{found.chance:.2g}",
-            *(_told(one) for one in (found.points_a, found.points_b, found.difference, found.away_per_minute)),
+            *(_interval_text(one) for one in (found.points_a, found.points_b, found.difference, found.away_per_minute)),
         )
     played = sum(found.games for _, found in cells)
     typer.echo(f"{match.title(played)}, figures of {a}, points per game, 95 % in brackets")
     Console(width=None if Console().is_terminal else 180, highlight=False).print(table)
 
 
-def _told(found: Interval) -> str:
+def _interval_text(found: Interval) -> str:
     """`1.25 [0.75, 1.75]`."""
     if found.low is None or found.high is None:
         return f"{found.value:.2f}"

@@ -80,7 +80,7 @@ def _power_of_two(exponent: NDArray[np.int64]) -> Floats:
 
 
 def log(x: Floats) -> Floats:
-    """Return the natural logarithm of x: -inf of zero, nan of what is negative."""
+    """Return the natural logarithm of x: -inf of zero, nan of a negative x."""
     x = _floats(x)
     inside = (x > 0.0) & (x < np.inf)
     if inside.all():

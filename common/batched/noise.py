@@ -55,7 +55,7 @@ def _blocks_of(counter: int, width: int, slot: int) -> int:
 
 
 class NoiseKeys:
-    """The streams of a batch, one for each row of what is drawn."""
+    """The streams of a batch, one for each row of draws."""
 
     def __init__(self, keys: Iterable[bytes]) -> None:
         """Take the draw keys of the streams, in the order of the rows."""
@@ -128,7 +128,7 @@ class NoiseKey:
 class NoiseAhead:
     """One stream at regular counters: with a draw those at the next ones are made, in a batch.
 
-    Draws are those of `NoiseKey`, bit for bit, and functions of the counter alone: what is kept only saves time. Of a
+    Draws are those of `NoiseKey`, bit for bit, and functions of the counter alone: the cache only saves time. Of a
     pair of numbers it saves five sixths.
     """
 

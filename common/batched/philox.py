@@ -19,10 +19,10 @@ RoundKeys: TypeAlias = tuple[tuple[int, int], ...]
 ROUNDS: Final = 10
 MULTIPLIERS: Final = (0xD2511F53, 0xCD9E8D57)
 STEPS: Final = (0x9E3779B9, 0xBB67AE85)
-"""What a key grows by from round to round: the fractions of the golden ratio and of the square root of 3."""
+"""The increments of a key from round to round: the fractions of the golden ratio and of the square root of 3."""
 HALF: Final = 0xFFFFFFFF
 
-# `Lanes` looks at a word of 64 bits as two of 32, the lower one first: so the order of its bytes is fixed.
+# `Lanes` views a word of 64 bits as two of 32, the lower one first: so the order of its bytes is fixed.
 _WORD: Final = np.dtype("<u8")
 _HALF_WORD: Final = np.dtype("<u4")
 _HALF_MASK: Final = np.array(HALF, _WORD)

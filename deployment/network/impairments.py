@@ -1,4 +1,4 @@
-"""What a link does to packets for reasons that geometry does not explain: loss, delay, rate, errors, copies.
+"""The impairments of a link that are independent of geometry: loss, delay, rate, errors, copies.
 
 These keys stand in a rule of the network and in a radio; what a rule does not write it takes from the radio. All
 delays are one way.
@@ -23,7 +23,7 @@ Bytes = Annotated[int, Quantity(units.SIZE, "0 B", "1 GiB")]
 ErrorRate = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
 
 
-# --- jitter: what is added to the constant delay, never negative ------------------------------------------------------
+# --- jitter: the addition to the constant delay, never negative -------------------------------------------------------
 
 
 def _mean_is_sd(data: dict[str, Any]) -> int:
@@ -124,7 +124,7 @@ BURST_MAX: Final = 1e6
 
 
 class Burst(SpecBase):
-    """Gilbert-Elliott by what it does: `loss` is the mean loss, `mean_bad` the mean length of a bad time.
+    """Gilbert-Elliott by its effect: `loss` is the mean loss, `mean_bad` the mean length of a bad time.
 
     `mean_bad` is a time: all flows on a link see the same outages, whatever their rate. `mean_burst` instead counts
     lost packets in a row. In a bad time a packet is lost with `bad_loss`, else it comes later by `bad_extra_delay`.
@@ -158,7 +158,7 @@ class Markov4(SpecBase):
 
 
 class Outages(SpecBase):
-    """The link is cut for times that come and go by themselves, as a mobile network's: exponential on and off."""
+    """Random outages of the link, as of a mobile network: exponential times on and off."""
 
     mean_on_ns: Dwell = Field(alias="mean_on")
     mean_off_ns: Dwell = Field(alias="mean_off")
@@ -186,7 +186,7 @@ class Corrupt(SpecBase):
 
 
 class Reorder(SpecBase):
-    """Some packets come later by `extra`: those behind them overtake."""
+    """Some packets come later by `extra`: later packets overtake them."""
 
     probability: Probability
     extra_ns: Spread = Field(alias="extra")
@@ -201,7 +201,7 @@ class Trace(SpecBase):
 
 
 class Impairments(SpecBase):
-    """What a link does beside radio and geometry."""
+    """The impairments of a link beside radio and geometry."""
 
     delay_ns: Delay = default("0 s", "delay")
     jitter: Jitter | None = None
@@ -221,20 +221,20 @@ class Impairments(SpecBase):
     payload_max: Bytes | None = Field(default=None, alias="mtu")
     """The longest payload that it carries."""
     ttl_ns: Annotated[int, Quantity(units.TIME, "1 us", "1 h")] | None = Field(default=None, alias="ttl")
-    """What would come later than this is dropped (`expired`)."""
+    """Packets with a greater delay are dropped (`expired`)."""
     allow: bool = True
     """Whether packets may pass at all; else they are `filtered`."""
 
 
 class OwnModel(SpecBase):
-    """A link model of one's own, which a package gives that is installed where the vHub runs, and its parameters."""
+    """A custom link model, of a package that is installed on the vHub's machine, and its parameters."""
 
     name: Name
     parameters: dict[str, JsonValue] = Field(default={}, max_length=256)
 
 
 class LinkSettings(Impairments):
-    """What a radio or a rule says of links; a model of one's own is theirs alone, no event changes it."""
+    """Settings of links in a radio or a rule; only these have a custom model, no event changes it."""
 
     model: OwnModel | None = None
 

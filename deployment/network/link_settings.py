@@ -16,16 +16,16 @@ from foosim.deployment.network.rules import LinkRule, Network
 
 PERFECT: Final = "perfect"
 ON_BOARD: Final = "on_board"
-"""The rule of a link between a robot and what is on it, where no rule matches: a perfect one."""
+"""The rule of a link between a robot and an endpoint on it, where no rule matches: a perfect one."""
 IDEAL: Final = "ideal"
 """The rule of a link to or from the console, where no rule names it: a perfect one, whatever selectors match it."""
 NO_RADIO: Final = "no_radio"
-"""The rule of a link between two that have radios: none of them the same, or not the one that their rule goes via."""
+"""The rule of a link between two endpoints without a common radio, or without the radio of their rule's `via`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What holds on a link: the name of what decided it, the radio that it goes via, and every setting."""
+    """The settings of a link, with the name of the rule that decided them and the radio."""
 
     rule: str
     radio: str
@@ -51,7 +51,7 @@ class Profiles:
         self._by_channel = any(rule.channels is not None for rule in network.links)
         modelled = any(of.model is not None for of in (*network.radios.values(), *network.links))
         self.on_radio = modelled or any(radio.is_on_air for radio in (*network.radios.values(), self.base("")))
-        """Whether the fate of packets may depend on where endpoints are: on air, or by a model of one's own."""
+        """Whether the fate of packets may depend on where endpoints are: on air, or by a custom model."""
 
     def kind(self, channel: str) -> str:
         """Return what of a channel decides a link's profile: nothing, where no rule names channels."""
@@ -76,7 +76,7 @@ class Profiles:
         yield None
 
     def _rules(self, source: str, destination: str) -> Sequence[LinkRule]:
-        """Return the rules that may be those of a pair: of the console's links those that name it."""
+        """Return the rules that may apply to a pair; to the console's links only rules with its name apply."""
         if self.console not in (source, destination):
             return self.network.links
         return [rule for rule in self.network.links if self.console in rule.selectors]
@@ -113,7 +113,7 @@ class Profiles:
         """Return the radio by which packets that meet a rule go; empty for that of the defaults, None where there is
         none.
 
-        A rule's `via` puts an endpoint that carries no radio on that one; who carries others needs one with the same
+        A rule's `via` puts an endpoint without radios on that one; an endpoint with others needs one with the same
         air.
         """
         mine, theirs = self.radios_of(source), self.radios_of(destination)
@@ -144,7 +144,7 @@ class Profiles:
 
 
 def over(base: Radio, changes: LinkRule | Impairments) -> Radio:
-    """Return a radio's settings with those that a rule writes; a model of bursts replaces another one."""
+    """Return a radio's settings with the rule's over them; a rule's model of bursts replaces the radio's."""
     written = {key: getattr(changes, key) for key in changes.model_fields_set if key in LinkSettings.model_fields}
     if any(key in written for key in BURSTS):
         written = dict.fromkeys(BURSTS) | written

@@ -1,4 +1,4 @@
-"""Presets of radios and wires: every value with where it comes from.
+"""Presets of radios and wires: every value with its source.
 
 The mark before a source says how far to trust it: [S] read in a standard's reference code or a project's source,
 [M] measured in a cited paper, [C] computed from such, [R] recalled from a standard that was not at hand: unverified,
@@ -139,7 +139,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "bandwidth": _v("2 MHz", "IEEE 802.15.4"),
         "tx_power": _v("0 dBm", "[J]; INET has 3.5 dBm [S]"),
         "noise_figure": _v("14.4 dB", "[C] INET's -96.6 dBm [S] in 2 MHz"),
-        "sensitivity": _v("-100 dBm", "[S] INET; the standard asks for -85 dBm"),
+        "sensitivity": _v("-100 dBm", "[S] INET; the standard requires -85 dBm"),
         "carrier_sense": _v("-85 dBm", "[J]"),
         "path_loss": {"environment": _v("indoor", _INH)},
         "retries": _v(3, f"{_NS3} lr-wpan-mac.cc"),

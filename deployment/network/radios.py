@@ -77,7 +77,7 @@ class Fading(SpecBase):
 
 
 class RadioKeys(LinkSettings):
-    """Everything that can be said of a radio."""
+    """All settings of a radio."""
 
     medium: Literal["none", "wired", "radio", "wifi", "ieee802154", "lora", "lte"] = "none"
     air: Name | None = None
@@ -103,7 +103,7 @@ class RadioKeys(LinkSettings):
     """The Wi-Fi access category: its window and its waiting time."""
     retries: Annotated[int, Field(ge=0, le=31)] = 7
     published: Literal["broadcast", "unicast"] = "broadcast"
-    """How a packet goes that is for all who subscribe: once for all without acknowledgement, or once for each.
+    """The transmission of a packet for all subscribers: once for all without acknowledgement, or once for each.
 
     Over LTE it is once for each."""
     spreading_factor: Annotated[int, Field(ge=7, le=12)] = 7
@@ -128,7 +128,7 @@ LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)
 
 
 def lora_longest(factor: object) -> int | None:
-    """Return the longest payload of a spreading factor, in bytes; None for what is none."""
+    """Return the longest payload of a spreading factor, in bytes; None for an unknown factor."""
     is_factor = isinstance(factor, int) and 7 <= factor <= 12
     return LORA_LONGEST[factor - 7] if isinstance(factor, int) and is_factor else None
 
@@ -155,7 +155,7 @@ class Radio(RadioKeys):
 
     @property
     def written(self) -> Mapping[str, Any]:
-        """What the file says of it, as plain data; the rest is of its preset."""
+        """Return its keys in the file, as plain data; the rest is of its preset."""
         return self._written
 
     @model_validator(mode="wrap")

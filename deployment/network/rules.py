@@ -1,4 +1,4 @@
-"""The network of a deployment: who carries which radio, what lies on each link, and what happens to it when.
+"""The network of a deployment: the radios of endpoints, the rules of links, and events.
 
 A link is a directed pair of endpoints; `between` writes both directions. The first rule that matches the pair (and the
 channel, where the rule names channels) is the link's; what it does not write comes from the radio that it goes `via`,
@@ -26,7 +26,7 @@ EVENTS_MAX: Final = 4096
 SELECTORS_MAX: Final = 16
 """Selectors on one side of a link rule."""
 REST: Final = "rest"
-"""In a partition: everybody whom no other group selects."""
+"""In a partition: all endpoints outside the other groups."""
 
 Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
 Moment = Annotated[int, Quantity(units.TIME, "0 s", "10000 h")]
@@ -49,9 +49,9 @@ def selects(globs: Sequence[str], name: str) -> bool:
 
 
 class LinkRule(LinkSettings):
-    """What the directed links between the endpoints that `from` and `to` select do to a packet.
+    """The settings of the directed links between the endpoints that `from` and `to` select.
 
-    What is not written comes from the radio.
+    Omitted keys have the values of the radio.
     """
 
     id: Name
@@ -111,20 +111,20 @@ def _groups(value: object) -> object:
 
 
 class Clog(SpecBase):
-    """What goes from one to the other waits until the clog is over."""
+    """Packets from one to the other wait until the clog is over."""
 
     from_: Selectors = Field(alias="from")
     to: Selectors
 
 
 class Change(Impairments):
-    """New settings of one link rule; what is not written stays."""
+    """New settings of one link rule; other settings stay."""
 
     link: Name
 
 
 class Event(SpecBase):
-    """Something that happens to the network `at` a simulated time: exactly one of the actions is written.
+    """An event of the network `at` a simulated time, with exactly one of the actions.
 
     Partitions and clogs last `for` a time or `until` one, else to the next heal. With `symmetric` off only what
     goes from the first group to the others is cut.
@@ -155,7 +155,7 @@ class Defaults(SpecBase):
     in_flight_on_partition: Literal["drop", "deliver"] = "drop"
     """What becomes of a packet that is on its way when a partition between its ends begins."""
     phase_ns: Delay = default("0 s", "phase")
-    """How far apart the clocks of radios are: the packets of each come to it later by a time of its own, at most this.
+    """The spread of radios' clocks: the packets of each radio reach it later by its own time, at most this.
 
     Without it all that is sent at one tick is sent at the same instant, and contends."""
 

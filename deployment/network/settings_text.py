@@ -1,4 +1,4 @@
-"""A network's settings as people read them."""
+"""Readable texts of a network's settings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _UNITS: Final = (
     ("_m", "m"),
     ("_bytes", "B"),
 )
-"""What the end of a field's name says of its unit."""
+"""The unit by the end of a field's name."""
 _SHORT: Final = {"bytes_max": "size_bytes", "payload_max": "mtu_bytes", "sense_dbm": "carrier_sense_dbm"}
 """Fields whose keys in a file are other words."""
 _PREFIXES: Final = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
@@ -31,7 +31,7 @@ _SHARES_OF_CHAINS: Final = frozenset({"p13", "p31", "p32", "p23", "p14", "bit_er
 
 
 def settings_text(settings: SpecBase) -> str:
-    """Return what is written of settings, all else being defaults: `delay 1 ms, loss 0.5 %`."""
+    """Return the text of the settings other than defaults: `delay 1 ms, loss 0.5 %`."""
     return ", ".join(_entries(settings.model_dump(exclude_unset=True)))
 
 
@@ -41,7 +41,7 @@ def radio_text(radio: Radio) -> str:
 
 
 def _differing(content: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entries that are not those of `base`, of mappings that both have the differing ones alone."""
+    """Return the entries that differ from those of `base`, recursively where both are mappings."""
     found = {}
     for name, value in content.items():
         other = base.get(name)
@@ -51,7 +51,7 @@ def _differing(content: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str,
 
 
 def impairments_text(settings: Impairments) -> str:
-    """Return what a rule, or an event that changes one, writes beside its ends."""
+    """Return the text of the settings of a rule, or of an event that changes one, without its ends."""
     written = settings.model_fields_set & set(LinkSettings.model_fields)
     values = {name: getattr(settings, name) for name in written}
     return settings_text(LinkSettings.model_construct(_fields_set=written, **values))

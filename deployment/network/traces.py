@@ -1,4 +1,4 @@
-"""Files that links are made from: traces of capacity in the form of mahimahi, and tables of delays in that of netem.
+"""Files of links: traces of capacity in the format of mahimahi, and tables of delays in that of netem.
 
 A trace has a line for each time, in ms, at which 1500 bytes can leave. A table has whitespace separated integers, 8192
 for a standard deviation; what follows a # is a comment.
@@ -17,7 +17,7 @@ NUMBERS_MAX: Final = 1_000_000
 
 
 def read_opportunities(text: str) -> tuple[int, ...]:
-    """Return the times in ms, ascending; raises ValueError, with the line, for what is no trace."""
+    """Return the times in ms, ascending; raises ValueError, with the line, for an invalid trace."""
     times: list[int] = []
     for number, line in enumerate(text.split("\n"), 1):
         word = line.partition("#")[0].strip()
@@ -36,7 +36,7 @@ def read_opportunities(text: str) -> tuple[int, ...]:
 
 
 def read_table(text: str) -> tuple[int, ...]:
-    """Return the numbers of a table, ascending; raises ValueError, with the line, for what is none."""
+    """Return the numbers of a table, ascending; raises ValueError, with the line, for an invalid table."""
     numbers: list[int] = []
     for number, line in enumerate(text.split("\n"), 1):
         for word in line.partition("#")[0].split():
@@ -63,12 +63,12 @@ def file_settings(network: Network) -> Iterator[tuple[str, TableJitter | Trace]]
 
 
 def network_files(network: Network) -> dict[str, str | None]:
-    """Return the files that links are made from, each with the digest that is written beside it."""
+    """Return the files of links, each with the digest that is written beside it."""
     return {setting.file: setting.digest for _, setting in file_settings(network)}
 
 
 def check_files(network: Network, files: Mapping[str, bytes]) -> None:
-    """Read the files of all links; raises AssetError for one that is missing, not the one meant or not acceptable."""
+    """Read the files of all links; raises AssetError for a missing or invalid one, and for another digest."""
     for place, setting in file_settings(network):
         content = files.get(setting.file)
         if content is None:

@@ -1,10 +1,10 @@
-"""Expands a deployment's tree: what is abbreviated in the text is written out, before the schema and the checks see it.
+"""Expands a deployment's tree: abbreviations of the text are written out, before the schema and the checks.
 
 Abbreviations are templates (`like`), fleets (`count`), entries for each robot (`each`), presets of kits (`preset`), and
 selectors in the place of robots' names: in the lists of nodes, where `rest` is whatever no other entry names, and as
 keys of a player's robots.
 The expanded tree has the places of what was written. It shares the nodes that several entries have in common, so that
-nobody changes it. Everything else in the tree is passed on as it is, wrong or not.
+it is never changed. Everything else in the tree is passed on as it is, wrong or not.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ ENTRIES: Final = (*FLEETS, *FOR_ROBOTS)
 class Expanded:
     """An expanded tree, None where a problem leaves none, and the problems.
 
-    What else is wrong with `broken` entries (section and name) follows from a problem. `unused` templates are of
-    nobody's, whole, with the places of their names.
+    Further errors in `broken` entries (section and name) follow from a problem. `unused` templates are whole, with the
+    places of their names.
     """
 
     tree: Tree | None
@@ -79,7 +79,7 @@ def _example(template: Fields) -> Fields:
 
 
 class Expansion:
-    """The expansion of one tree, part by part: each is computed when it is asked for. Methods raise Stopped."""
+    """The expansion of one tree, part by part: each is computed at its first use. Methods raise Stopped."""
 
     def __init__(self, tree: Fields, report: Report) -> None:
         self._tree = tree
@@ -105,7 +105,7 @@ class Expansion:
         return whole
 
     def section(self, name: str) -> Tree | None:
-        """Return one section, expanded; of templates those that are not wrong. None where there is none."""
+        """Return one section, expanded, without invalid templates; None for an absent section."""
         section = self._tree.values.get(name)
         if not isinstance(section, Fields):
             return section
@@ -131,7 +131,7 @@ class Expansion:
         return Population(self._robots.values if isinstance(self._robots, Fields) else ())
 
     def _entries(self, name: str, section: Fields) -> Fields:
-        """Return a section with all entries that it has or makes, each in the place of the one that makes it."""
+        """Return a section with all of its entries, each made one in the place of its maker."""
         if name not in self._made:
             self._made[name] = self._makes(name, section)
         made, whole = self._made[name], Fields(section.place)
@@ -155,7 +155,7 @@ class Expansion:
     def _changed(
         self, usual: Tree, raw: Fields, path: tuple[str, str], one: str, change: Change, own: Tree | None
     ) -> Tree:
-        """Return one of what an entry makes, with what is written of it alone."""
+        """Return one of the entries that an entry makes, with its own keys."""
         if isinstance(own, Fields) and LIKE in own.values:
             like = Fields(own.place, {LIKE: own.values[LIKE]}, {LIKE: own.keys[LIKE]})
             usual, own = self.templates.applied(merged(raw, like), (path[0], one)), without(own, LIKE)
@@ -266,7 +266,7 @@ class Expansion:
         return listed
 
     def _put_rest(self, lists: Mapping[str, Items]) -> None:
-        """Put the robots that no list names in place of `rest`; the first one that says so has them."""
+        """Put the robots of no list in place of `rest`, the first of them."""
         if REST in self._population.names:
             return
         listed = {item.value for items in lists.values() for item in items.items if isinstance(item, Leaf)}
@@ -340,5 +340,5 @@ def _maker(section: Fields, key: str) -> tuple[str, Place, Place]:
 
 
 def _has_spares(entry: Fields) -> bool:
-    """Whether `spare` says how many."""
+    """Whether `spare` is a count."""
     return SPARE in entry.values and not isinstance(plain(entry.values[SPARE]), bool)

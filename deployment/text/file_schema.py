@@ -1,4 +1,4 @@
-"""The JSON Schema of what people write, made from that of the models, which know nothing of abbreviations.
+"""The JSON Schema of a deployment file: that of the models, with the abbreviations of files.
 
 Entries of a section may be like a template, and then have any part of their keys; in those for each robot texts may
 have signs (`$robot`). What is missing in the end, and whether names exist, only `foosim check` says.
@@ -21,17 +21,17 @@ Schema = dict[str, Any]
 DESCRIPTIONS: Final[Mapping[str, str]] = {
     INCLUDE: "files with further sections, by their paths in the folder of this one",
     TEMPLATES: "partial robots, things of the scenery, players and clients, which entries are `like`",
-    LIKE: "the name of a template, which has what is not written here",
+    LIKE: "the name of a template, whose keys apply where this entry has none",
     COUNT: "how many of these there are: NAME-1 to NAME-N",
     SPARE: "whether it is absent until it is added, or how many more of these are: the last ones",
-    SPACING: "how much further along x, y and z each of them stands than the one before",
-    PRESET: "the name of a preset of the kit, which has what is not written here",
+    SPACING: "the distance along x, y and z from each of them to the next",
+    PRESET: "the name of a preset of the kit, whose keys apply where this section has none",
     EACH: "a selector of robots: there is one of these for each, and $robot is its name",
 }
 NUMBERED: Final = "-[1-9][0-9]*$"
-"""Ends the name of what a count may have made; an entry under such a name may hold what is different about it."""
+"""Ends the name of an entry of a count; the file may have an entry of that name with its own keys."""
 _OF_WHOLE: Final = ("required", "discriminator", "minProperties")
-"""What is said of whole entries alone."""
+"""Keywords of whole entries alone."""
 _PARTIAL: Final = "Partial"
 _REF: Final = "#/$defs/"
 _NULL: Final[Schema] = {"type": "null"}
@@ -39,9 +39,9 @@ _SIGNS: Final[Schema] = {"pattern": "[$]", "type": "string"}
 
 
 def file_schema(schema: Schema, presets: Mapping[str, Sequence[str]]) -> Schema:
-    """Return the schema of a deployment's file, from that of the expanded deployment, which is not changed.
+    """Return the schema of a deployment's file, from that of the expanded deployment, which stays unchanged.
 
-    `presets` are the names of those of each kit that has some.
+    `presets` are the names of the presets of each kit.
     """
     properties, models = dict(schema["properties"]), dict(schema["$defs"])
     partly_of: list[Schema] = []
@@ -78,7 +78,7 @@ def file_schema(schema: Schema, presets: Mapping[str, Sequence[str]]) -> Schema:
 
 def _entries(section: str, pattern: str, entry: Schema, partly: Schema) -> Schema:
     """Return the schemas of a section's entries by the pattern of their names."""
-    if section in FOR_ROBOTS:  # any of them may say what is different about one that is made
+    if section in FOR_ROBOTS:  # each may have the own keys of a made entry
         return {pattern: partly, "[$]": partly}
     whole = {"if": {"required": [LIKE]}, "then": partly, "else": entry}
     return {f"^(?!.*{NUMBERED}){pattern[1:]}": whole, f"^(?=.*{NUMBERED}){pattern[1:]}": partly}

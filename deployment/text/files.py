@@ -1,7 +1,7 @@
 """Reads a deployment's file and those beside it that it includes or refers to, from its folder and from nowhere else.
 
 A path is taken apart and each component opened in the folder before it, without following links, so nothing outside is
-ever opened, whatever the path says and whoever changes the folder meanwhile.
+ever opened, for any path and any change of the folder meanwhile.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _FILE = _COMPONENT | os.O_NONBLOCK  # a pipe without a writer would block
 
 
 def read_source_file(path: Path) -> Source:
-    """The text of a deployment file with those that it includes; raises DeploymentError where one cannot be read."""
+    """Return the texts of a deployment file and of its includes; raises DeploymentError for an unreadable one."""
     text = read_deployment_text(path)
     texts: dict[str, str] = {}
     problems: list[Problem] = []
@@ -51,7 +51,7 @@ def read_source_file(path: Path) -> Source:
 
 
 def read_deployment_text(path: Path) -> str:
-    """The text of a deployment file, bounded before it is read, without what it includes; raises DeploymentError."""
+    """Return the text of a deployment file, bounded before it is read, without its includes; raises DeploymentError."""
     try:
         with path.open("rb") as file:
             raw = file.read(limits.DEPLOYMENT_BYTES_MAX + 1)
@@ -93,7 +93,7 @@ def read_files(
 ) -> dict[str, bytes]:
     """The contents of files by their paths inside the asset folder `assets` of a folder; raises AssetError.
 
-    `known` are those that were read before: there is a limit of all together.
+    `known` are the files that were read before: the limit is one of all together.
     """
     files: dict[str, bytes] = {}
     where = (folder / assets).absolute()

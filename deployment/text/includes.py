@@ -33,7 +33,7 @@ from foosim.world.scenery import path_problem
 
 INCLUDE: Final = "include"
 TREES_KEPT: Final = 16
-"""Files that are not read again when other settings are placed in them."""
+"""Cached trees of files, for the next read with other settings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A file that is to be included, and where that is said."""
+    """A file to include, and the place of its include."""
 
     path: str
     place: Place
@@ -69,7 +69,7 @@ def _tree_of(text: str, file: str, rank: int) -> tuple[Tree | None, list[Problem
 
 
 def read_source(source: str | Source, name: str) -> tuple[Tree | None, list[Problem]]:
-    """Return the tree of a text with what it includes, and all problems; None where anything is refused.
+    """Return the tree of a text with its includes, and all problems; None where anything is refused.
 
     `name` is the file's in messages. The tree is the caller's own.
     """
@@ -87,7 +87,7 @@ def read_source(source: str | Source, name: str) -> tuple[Tree | None, list[Prob
 
 
 def inlined(text: str, name: str, text_of: TextOf) -> tuple[Tree | None, list[Problem]]:
-    """Return the tree of a deployment's text with what it includes, as files are asked for; nobody changes it."""
+    """Return the tree of a deployment's text with its includes, read by `text_of`; it must not be changed."""
     tree, problems = _tree_of(text, name, 0)
     if not isinstance(tree, Fields) or INCLUDE not in tree.values:
         return tree, problems
@@ -111,7 +111,7 @@ class _Inliner:
         self._nodes = measure(root)[1]
 
     def add(self, tree: Fields, chain: tuple[str, ...]) -> None:
-        """Add what a file includes, then its own sections. `chain` are the files that include one another up to it."""
+        """Add the includes of a file, then its own sections. `chain` are the files on the path of includes to it."""
         for wanted in self._wanted(tree):
             problem = self._problem(wanted, chain)
             if problem:

@@ -29,17 +29,17 @@ SPARE: Final = "spare"
 SPACING: Final = "spacing"
 AXES: Final = ("x", "y", "z")
 AT: Final = "at"
-"""The pose of an entry that has one: it is what the spacing changes."""
+"""The pose of an entry, which the spacing changes."""
 EACH: Final = "each"
 NODE: Final = "$node"
 PLACES: Final = ("process", "host", "label")
-"""Keys of an entry that say where it runs."""
+"""Keys for the host of an entry."""
 
 _SIGN: Final = re.compile(r"\$([a-z]+|[0-9]|\$)?")
 _UNIT: Final = re.compile(r"[A-Za-z]+ *$")
 
 Change = Callable[[Tree], Tree]
-"""From an entry as it is written of all that it makes to that of one."""
+"""Turns the written entry, which is of all that it makes, into one of them."""
 
 
 # --- count ------------------------------------------------------------------------------------------------------------
@@ -47,7 +47,7 @@ Change = Callable[[Tree], Tree]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """How much further along an axis each one is: an exact length in metres, as it is written where."""
+    """The distance along an axis from each entry to the next: an exact length in metres, as written, with its place."""
 
     exact_m: Fraction
     leaf: Leaf
@@ -61,7 +61,7 @@ def counted(entry: Fields, path: tuple[str, str], count_max: int, report: Report
         spare = None
     if COUNT not in entry.values and spare is None:
         if SPACING in entry.values:
-            report.add(entry.keys[SPACING], path, "a spacing of what has no count", SPACING)
+            report.add(entry.keys[SPACING], path, "spacing without count", SPACING)
         return {}
     present, spares = (
         0 if node is None else _count(node, (*path, key), count_max, report)
@@ -84,7 +84,7 @@ def _count(node: Tree, path: Location, count_max: int, report: Report) -> int:
 
 
 def _spacing(node: Tree | None, path: Location, report: Report) -> dict[str, Step]:
-    """Return the steps by axis, without those, reported, that are none."""
+    """Return the steps by axis; invalid ones are reported and left out."""
     steps: dict[str, Step] = {}
     if not isinstance(node, Fields):
         if node is not None:
@@ -133,7 +133,7 @@ def _moved(entry: Tree, spacing: Mapping[str, Step], steps: int) -> Tree:
 
 
 def _has_a_pose(entry: Fields) -> bool:
-    """Whether the model of an entry has its place in `at`; what is wrong with the model is found elsewhere."""
+    """Whether the model of an entry has its place in `at`; errors of the model are found elsewhere."""
     model = entry.values.get("model")
     try:
         return isinstance(model, Leaf) and AT in registry.find_model(str(model.value)).settings.model_fields
@@ -142,7 +142,7 @@ def _has_a_pose(entry: Fields) -> bool:
 
 
 def _further(text: Scalar, step: Step, steps: int) -> Scalar:
-    """Return a length that is some steps further, in its own unit; one that is none stays, for the schema."""
+    """Return a length increased by some steps, in its own unit; an invalid one stays, for the schema."""
     try:
         exact_m = units.parse(text, units.LENGTH) + steps * step.exact_m
     except BadValue:
@@ -180,7 +180,7 @@ def put(text: str, place: Place, values: Mapping[str, str]) -> str:
         known = values.get(found[1] or "")
         if known is None:
             valid = ", ".join(f"${sign}" for sign in values)
-            raise BadSign(place, BadValue(f"a $ that stands for nothing here (valid are {valid})", text))
+            raise BadSign(place, BadValue(f"a $ without a meaning here (valid are {valid})", text))
         return known
 
     return _SIGN.sub(value, text)
@@ -226,7 +226,7 @@ def _is_other(one: Tree, other: Tree) -> bool:
 
 
 def without_places_by_node(tree: Fields) -> None:
-    """Take away from a tree as it is written where entries run that follows from their robots' nodes."""
+    """Remove from a written tree the hosts of entries that follow from their robots' nodes."""
     for name in ("templates", "players"):
         section = tree.values.get(name)
         for entry in section.values.values() if isinstance(section, Fields) else ():

@@ -20,7 +20,7 @@ from foosim.deployment.text.templates import TEMPLATES
 from foosim.deployment.text.yaml import SETS_RANK, Fields, Items, Place, Problem, Tree, plain
 
 FINDINGS_MAX: Final = 2_000
-"""Findings that are looked at, also of those that are the same problem: each may have thousands of names to compare."""
+"""Findings that are read, with repeated ones: each may have thousands of names to compare."""
 _AS_WRITTEN: Final = (TEMPLATES, "nodes")
 """Sections whose locations are those in the text: an index of a node's list has no meaning when it is expanded."""
 
@@ -43,7 +43,7 @@ class Places:
             self._expanded = Fields(expanded.place, values, keys)
 
     def problem(self, finding: Finding, *, is_made: bool = False) -> Problem:
-        """Return the problem that a finding is. `is_made`: it is one of an entry as it is made, whatever made it."""
+        """Return the problem of a finding. `is_made`: it is of an entry as made, for any maker."""
         finding = with_written(finding, self._data)
         place, is_key, depth = self._find(finding)
         if finding.other is not None:
@@ -60,7 +60,7 @@ class Places:
         return Problem(place, replace(finding, location=location).text)
 
     def distinct(self, findings: Iterable[Finding], broken: Collection[Location]) -> Iterator[Finding]:
-        """Yield the findings that are no other's problem, and not of broken entries; lazily, and so many at most."""
+        """Yield the findings without repeated ones and those of broken entries; lazily, from at most `FINDINGS_MAX`."""
         met: set[Key] = set()
         for number, finding in enumerate(findings):
             if number == FINDINGS_MAX:
@@ -114,7 +114,7 @@ def _walk(node: Tree, location: Location) -> Iterator[tuple[Place, bool, Locatio
 
 
 def _nameless(finding: Finding) -> str:
-    """Return what a finding says, without the names of the entry that it is about, and of what that is for."""
+    """Return the text of a finding without the name of its entry and the name that this is for."""
     if finding.location[:1] == ("nodes",):
         return finding.what  # of each robot that a selector matches
     text = describe(finding.what, finding.value)

@@ -24,12 +24,12 @@ _SIGNS: Final = re.compile(r"[*?]")
 
 
 def is_several(text: str) -> bool:
-    """Whether a text that stands for names is no single one: a glob, or a range."""
+    """Whether a text stands for several names: a glob, or a range."""
     return len(text) <= SELECTOR_LENGTH_MAX and is_selector(text) and (bool(_SIGNS.search(text)) or ".." in text)
 
 
 class Selector:
-    """A glob, a range or a name, and what its wildcards match. Raises BadValue for a text that is none."""
+    """A glob, a range or a name, and what its wildcards match. Raises BadValue for an invalid text."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -55,7 +55,7 @@ class Selector:
         return self._pattern.groups
 
     def match(self, name: str) -> tuple[str, ...] | None:
-        """Return what the wildcards match, None for a name that is not selected."""
+        """Return the texts that the wildcards match, None for a name outside the selection."""
         found = self._pattern.fullmatch(name)
         if found is None:
             return None
@@ -71,7 +71,7 @@ class Selector:
 def _glob(text: str) -> re.Pattern[str]:
     """Return the pattern of a glob.
 
-    What a * matches is as short as possible, and not tried again: a glob needs no more, and many of them do not take
+    A * matches as little as possible, without a second try: a glob needs no more, and many of them do not take
     exponential time.
     """
     first, *others = text.split("*")

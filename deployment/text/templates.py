@@ -25,7 +25,7 @@ TEMPLATES: Final = "templates"
 LIKE: Final = "like"
 PRESET: Final = "preset"
 OF_ENTRIES: Final = ("count", "spacing", "each")
-"""Keys that an entry has, and no template: how many there are is said where they are."""
+"""Keys of entries, invalid in templates: an entry has its own count."""
 
 
 def merged(base: Tree, own: Tree) -> Tree:
@@ -50,7 +50,7 @@ def without(fields: Fields, *keys: str) -> Fields:
 
 
 class Templates:
-    """The templates of a deployment's tree. What is wrong with them goes into the report, once."""
+    """The templates of a deployment's tree. Their errors are reported once."""
 
     def __init__(self, tree: Fields, report: Report) -> None:
         self._report = report
@@ -93,7 +93,7 @@ class Templates:
         return list(self._written)
 
     def applied(self, entry: Tree, path: tuple[str, str]) -> Tree:
-        """Return an entry of a section with what it is like. Where that cannot be said the entry is broken."""
+        """Return an entry of a section merged with its template. Without a valid template the entry is broken."""
         like = entry.values.get(LIKE) if isinstance(entry, Fields) else None
         if like is None or not isinstance(entry, Fields):
             return entry
@@ -104,7 +104,7 @@ class Templates:
         return merged(template, own)
 
     def whole(self, name: str, chain: tuple[str, ...] = ()) -> Fields | None:
-        """Return a template with what it is like; None, reported, where that cannot be said."""
+        """Return a template merged with its own template; None, reported, without a valid one."""
         if name not in self._whole:
             template = self._written[name]
             like = template.values.get(LIKE)
@@ -146,7 +146,7 @@ class Templates:
 def with_preset(name: str, section: Tree, report: Report) -> Tree:
     """Return a section over the preset that it names, itself where it names none or is that of no kit with presets.
 
-    What comes from the preset has the place of its name. Of an unknown one, which is reported, the first stands in.
+    Values of the preset have the place of its name. An unknown preset is reported, and replaced by the first.
     """
     if not isinstance(section, Fields) or PRESET not in section.values:
         return section

@@ -22,7 +22,7 @@ DEPTH_MAX: Final = 16
 NODES_MAX: Final = 20_000
 NUMBER_LENGTH_MAX: Final = 40
 KEY_LENGTH_MAX: Final = 512
-"""Longer keys are written behind a question mark: readers look for a colon within 1,024 characters."""
+"""Longer keys are written after a question mark: readers search for a colon within 1,024 characters."""
 SETS_RANK: Final = 1_000
 """The rank of places in settings of a command line: files are before it."""
 
@@ -40,7 +40,7 @@ _WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null")
 class Place:
     """A place in a file: line and column from 1, in characters.
 
-    `rank` orders files: the deployment's is 0, those that it includes follow, then settings of a command line.
+    `rank` orders files: the deployment's is 0, its includes follow, then settings of a command line.
     """
 
     rank: int
@@ -310,8 +310,7 @@ def write_yaml(data: Any) -> str:
 
 
 def _lines(data: dict[Any, Any] | list[Any], first: str, indent: str) -> Iterator[str]:
-    """Yield the lines of a collection that is not empty. `first` is what its first line begins with, `indent` what the
-    others do."""
+    """Yield the lines of a non-empty collection. `first` begins its first line, `indent` the others."""
     entries = enumerate(data) if isinstance(data, list) else data.items()
     for key, value in entries:
         begin = f"{first}-" if isinstance(data, list) else f"{first}{_scalar(key)}:"
@@ -330,7 +329,7 @@ def _lines(data: dict[Any, Any] | list[Any], first: str, indent: str) -> Iterato
 
 
 def _scalar(value: Any) -> str:
-    """Return a scalar or an empty collection as it is written."""
+    """Return the text of a scalar or of an empty collection."""
     if isinstance(value, float):
         text = repr(value)
         return text if "." in text else text.replace("e", ".0e")  # a text in YAML 1.1 without a point

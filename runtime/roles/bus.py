@@ -68,7 +68,7 @@ class Bus:
                 readers.remove(process)
 
     def readers(self, channel: Channel, name: str) -> list[str]:
-        """Return who reads messages of a channel that name this process, in the order of subscription."""
+        """Return the readers of messages of a channel that name this process, in the order of subscription."""
         return [*self._readers.get((channel.key, ""), ()), *self._readers.get((channel.key, name), ())]
 
     def cut_off(self, process: str, until_ns: int, *, output: bool = True, input_: bool = True) -> None:

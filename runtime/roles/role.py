@@ -39,7 +39,7 @@ class Appender(Protocol):
 
 
 class Role:
-    """One core with its hooks. Set those that it needs before its loop runs."""
+    """One core with its hooks. Set the needed ones before its loop runs."""
 
     def __init__(self, name: str, core: Core, log: logging.Logger, deadline_ns: Callable[[int], int]) -> None:
         """`deadline_ns(now)` returns the time of the core's next deadline."""

@@ -34,7 +34,7 @@ CONNECT_S: Final = UNKNOWN_NS / 1e9
 RUN: Final = "run:"
 """Before the name of a run, instead of an address."""
 LOOK_S: Final = 0.02
-"""How often a process looks for the address of its run."""
+"""The period of reading the address of its run."""
 
 
 class RoleShell:
@@ -78,7 +78,7 @@ class RoleShell:
         self._exposure = Exposure(parse_address(locator), time.monotonic_ns())
 
     def check(self, now_ns: int) -> None:
-        """Do what is due in each turn. Raises NotAuthorised when the router has not admitted this process in time."""
+        """Do the work of each turn. Raises NotAuthorised when the router has not admitted this process in time."""
         if self._admission is not None:
             self._admission.check(now_ns)
         if self._exposure is not None and (reminder := self._exposure.due(now_ns)):
@@ -95,7 +95,7 @@ class Runnable(Protocol):
         """Whether the role has nothing more to do."""
 
     def finish(self) -> int:
-        """Perform the last actions; return the role's exit code. Raises Failed with what is to be reported."""
+        """Perform the last actions; return the role's exit code. Raises Failed with the reason to report."""
 
     def leave(self) -> None:
         """Leave files as a kill would: the process ends before the role is over."""
@@ -128,7 +128,7 @@ class Process:
     def run(self) -> int:
         """Run the roles until all are over; return the greatest of their exit codes. Raises Failed.
 
-        A role that is not done when it ends takes the others with it, but for the supervisor, which ends the run in
+        A role that ends unfinished ends the others too, except the supervisor, which ends the run in
         order. One that raises Failed at its end lets the others end.
         """
         failures: list[Failed] = []
@@ -195,7 +195,7 @@ def client_session(
     """Connect to the router of a plane at `connect`, with the certificate of `identity` where `pki` names a folder.
 
     `connect` is an address, or `run:NAME` for a run of this user on this machine, whose address is waited for.
-    `sets_runtime`: the first session of a process that is no router, which chooses Zenoh's client runtime.
+    `sets_runtime`: the first session of a process other than a router, which chooses Zenoh's client runtime.
     Raises NoRun, CertificateError, ConnectError after `CONNECT_S` or when `stop` is set.
     """
     credentials = load_credentials(pki, identity)

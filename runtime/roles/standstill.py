@@ -11,8 +11,8 @@ from typing import Final
 STOOD_NS: Final = 20_000_000
 """A turn that is late by at most this is no standstill."""
 REPORTED_NS: Final = 1_000_000_000
-"""A standstill of at least this is logged. Its connections may have closed meanwhile (`settings.LEASE_MS`), which is
-no failure of the other processes."""
+"""A standstill of at least this is logged. Its connections may have closed meanwhile (`settings.LEASE_MS`), without a
+failure of the other processes."""
 
 
 class Standstill:

@@ -32,7 +32,7 @@ class Wire:
         self._publishers: dict[str, Publisher] = {}
 
     def read(self, reads: Sequence[tuple[Channel, bool]], waits: Sequence[Channel] = ()) -> None:
-        """Read these channels: (channel, whether only what is addressed to this name).
+        """Read these channels: (channel, whether only messages to this name).
 
         `waits` are those in whose queues the reader of a process with one role itself waits: the fastest path, for
         messages of every tick.
@@ -62,8 +62,8 @@ class Wire:
     def _receive_plane(self) -> None:
         """Let the reader of the process wait for all that others publish on the plane, once for all of its roles.
 
-        What comes to the plane's router is nearly all for the roles beside it. A thread for each channel, which hands
-        over to the reader, costs another wake-up a message.
+        Nearly all messages to the router of a plane are for roles of its process. A thread for each channel costs
+        another wake-up a message.
         """
         stem = _STEM[self.plane]
         if not self._inbox.has(stem):

@@ -1,4 +1,4 @@
-"""What is in the files of certificates and keys: read, and checked against each other."""
+"""The contents of files of certificates and keys: read, and checked against each other."""
 
 from __future__ import annotations
 

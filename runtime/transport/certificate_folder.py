@@ -19,7 +19,7 @@ class CertificateError(Refused):
 
 
 def read_bounded(path: Path) -> bytes:
-    """Return what is in a file of the folder, of a huge one the beginning. Raises CertificateError."""
+    """Return the content of a file of the folder, of a huge one the beginning. Raises CertificateError."""
     try:
         with path.open("rb") as file:
             return file.read(FILE_BYTES_MAX)

@@ -1,9 +1,9 @@
-"""The folder of certificates, and how a process proves from it who it is.
+"""The folder of certificates, by which a process proves its identity.
 
     ca.pem                   the root that all processes trust
     IDENTITY.pem .key        a certificate and its key; the certificate's common name is the identity
 
-A refused connection looks like a router that is not there, to both sides. So everything that can be checked here is
+A refused connection looks like a missing router, to both sides. So everything that can be checked here is
 checked before anything is opened. A process of a run without certificates, which most are, does not load what reads
 them.
 """
@@ -31,7 +31,7 @@ from foosim.runtime.transport.certificate_folder import (
 OPERATOR_VARIABLE: Final = "FOOSIM_OPERATOR"
 """Names the operator whose certificate control commands show, where there are several."""
 VIEWER_VARIABLE: Final = "FOOSIM_VIEWER"
-"""The same of the viewer whose certificate is shown by who only looks."""
+"""The same of the viewer whose certificate a reading client uses."""
 SOON: Final = timedelta(days=14)
 """A certificate that ends within this is to be renewed."""
 
@@ -42,7 +42,7 @@ class NotAuthorised(Refused):
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """What a process shows and whom it trusts."""
+    """The certificate of a process, and the roots that it trusts."""
 
     identity: str
     ca: Path
@@ -63,7 +63,7 @@ class Credentials:
 
 
 def load_credentials(folder: Path | None, identity: str) -> Credentials | None:
-    """Return what the folder has for an identity, checked; None without a folder. Raises CertificateError."""
+    """Return the checked credentials of an identity in the folder; None without a folder. Raises CertificateError."""
     if folder is None:
         return None
     from foosim.runtime.transport import certificate_files as files
@@ -104,7 +104,7 @@ def operator_credentials(folder: Path | None) -> Credentials | None:
 def viewer_credentials(folder: Path | None) -> Credentials | None:
     """Return those of the viewer that FOOSIM_VIEWER names, or of the only one there; as `load_credentials`.
 
-    Where there is none, those of an operator, who may look as well.
+    Without a viewer, those of an operator, which may read as well.
     """
     if folder is None:
         return None
@@ -113,7 +113,7 @@ def viewer_credentials(folder: Path | None) -> Credentials | None:
 
 
 def _credentials_of_one(folder: Path, role: str, variable: str) -> Credentials | None:
-    """Return those of the one in a role whom a variable of the environment names, or of the only one there."""
+    """Return the credentials in a role that a variable of the environment names, or the only ones."""
     name = os.environ.get(variable)
     if name is not None:
         return load_credentials(folder, f"{role}.{name}")
@@ -132,7 +132,7 @@ def warn_of_end(credentials: Credentials | None, log: logging.Logger) -> None:
 
 
 def check_host(credentials: Credentials | None, locator: str) -> None:
-    """Raise CertificateError when those who connect to where we listen would not find its host in our certificate."""
+    """Raise CertificateError when our certificate lacks the host of the address where we listen."""
     if credentials is None:
         return
     from foosim.runtime.transport.certificate_files import hosts_of, read_certificate

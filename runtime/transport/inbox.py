@@ -151,7 +151,7 @@ class Inbox:
             self._bell.release()
 
     def _wait(self, deadline_ns: int | None) -> list[Item]:
-        """Wait for a message, a ring or the deadline; return what the source has."""
+        """Wait for a message, a ring or the deadline; return the content of the source."""
         source = self._source
         if source is not None and self._alarm is not None:
             if deadline_ns is not None:
@@ -164,7 +164,7 @@ class Inbox:
     def _hand_over(self, items: list[Item]) -> list[Item]:
         """Return the messages of the source and then the offered ones, up to the limit."""
         if self._items:
-            with self._guard:  # or an offer could still append to what the reader has
+            with self._guard:  # or an offer could still append to the reader's messages
                 offered, self._items = self._items, []
             items = items + offered if items else offered
         count = len(items)

@@ -46,7 +46,7 @@ ROUTER_THREADS: Final = 8
 stuck client stopped healthy ones for 9 s; with eight for 1.3 s, and nothing of theirs was lost."""
 KEYS_KEPT: Final = 4096
 BELL: Final = "-"
-"""Last chunk of a bell's key, which is no valid name."""
+"""Last chunk of a bell's key, invalid as a name."""
 
 ROUTER_RUNTIME: Final = f"(rx: (worker_threads: {ROUTER_THREADS}), acc: (handover: rx))"
 """The threads that receive also watch the sockets, so a message wakes one thread instead of two."""
@@ -152,7 +152,7 @@ class Publisher:
 
 
 class Session:
-    """One session of a process. Use it in `with`; what it declares lives as long as it does."""
+    """One session of a process. Use it in `with`; its declarations live as long as it does."""
 
     def __init__(self, session: zenoh.Session, locator: str, *, is_open_router: bool = False) -> None:
         self.locator: Final = locator

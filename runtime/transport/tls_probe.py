@@ -1,6 +1,6 @@
 """The reason of a refusal by a router: a TLS handshake of our own, since Zenoh reports every refusal as a timeout.
 
-Only certain reasons are reported early: a certificate that is not trusted, or an alert of the other side. A router that
+Only certain reasons are reported early: an untrusted certificate, or an alert of the other side. A router that
 does not answer may still start.
 """
 
@@ -28,7 +28,7 @@ def probe(address: Address, credentials: Credentials | None, is_last: bool) -> N
     else:
         if credentials is not None and is_last:
             raise NotAuthorised(
-                f"{credentials.identity}: not authorised, or not reachable: {address} speaks TLS, and refuses this "
+                f"{credentials.identity}: not authorised, or not reachable: {address} uses TLS, and refuses this "
                 "certificate"
             )
 

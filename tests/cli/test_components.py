@@ -96,7 +96,7 @@ TOLD: Final = {
         "usual rules: battery (battery)",
         "tags: vehicle",
     ],
-    ("model", "ball"): ["no robot: nobody owns it", "moved by: an engine"],
+    ("model", "ball"): ["not a robot, has no owner", "moved by: an engine"],
     ("model", "station"): ["moved by: nothing"],
     ("kit", "table"): ["rules: football (football)", "beside the robots: ball (ball)"],
     ("model", "fire"): ["can be set: at (a pose), radius (0 m to 100 m)", "moved by: Growing", "tags: fire"],

@@ -165,7 +165,7 @@ def test_settings_are_nested() -> None:
     for wrong, line in (
         (["loss"], "KEY=VALUE: not of the form key.key=VALUE, 'loss'"),
         (["=3"], "KEY=VALUE: not of the form key.key=VALUE, '=3'"),
-        (["loss=1%", "loss.x=2"], "KEY=VALUE: set inside a value that is no mapping, 'loss', 'loss.x=2'"),
+        (["loss=1%", "loss.x=2"], "KEY=VALUE: set inside a value other than a mapping, 'loss', 'loss.x=2'"),
         (["loss=[1"], "KEY=VALUE: not valid YAML, expected ',' or ']', but got '<stream end>', .*, 'loss=\\[1'"),
         (["x=&a 1"], "KEY=VALUE: .*, 'x=&a 1'"),
     ):

@@ -270,11 +270,14 @@ def test_without_a_live_run_there_is_nobody_to_control(command: Command, argumen
         ),
         (("rate", "0x"), "foosim rate PACE: out of range 0.001x to 1000x, '0x'"),
         (("rate", "-1x"), "foosim rate PACE: out of range 0.001x to 1000x, '-1x'"),
-        (("push", "0", "nan", "0"), "impulse: three numbers are needed, X Y Z in N s; not all of these are numbers, '0 nan 0'"),
+        (
+            ("push", "0", "nan", "0"),
+            "impulse: three numbers are needed, X Y Z in N s; not all are finite numbers, '0 nan 0'",
+        ),
         (("push", "0", "-1"), "impulse: three numbers are needed, X Y Z in N s; here are 2, '0 -1'"),
         (
             ("push", "0", "1", "x"),
-            "impulse: three numbers are needed, X Y Z in N s; not all of these are numbers, '0 1 x'",
+            "impulse: three numbers are needed, X Y Z in N s; not all are finite numbers, '0 1 x'",
         ),
         (
             ("up", "a.yaml", "--resume", "mine", "--seed", "0", "--no-capture"),

@@ -98,7 +98,7 @@ def test_what_is_no_quantity_is_refused_with_the_units_named(text: object, dimen
     ("text", "message"),
     [
         ("0.5 ns", "not a whole number of ns, '0.5 ns'"),
-        ("-1 ms", "a time that is not negative is needed, '-1 ms'"),
+        ("-1 ms", "negative; a time is at least 0, '-1 ms'"),
         ("1e-9 us", "not a whole number of ns, '1e-9 us'"),
     ],
 )

@@ -126,7 +126,7 @@ def test_a_rule_of_robots_that_nobody_solves_is_refused(site: Path) -> None:
         ("needs=('contacts',), writes=('contacts',)", ""),
         ("writes=('contact',)", "rule of entities that writes contact: a rod has joint_positions, joint_velocities, "
          "joint_efforts, quarantined, down, contacts, refused, unmoved, clamped, nearest to contact is contacts"),
-        ("needs=('contact',)", "rule of entities that a rod cannot carry, which has no contact (valid on: none; a rod "
+        ("needs=('contact',)", "rule of entities that a rod cannot carry, for lack of contact (valid on: none; a rod "
          "has joint_positions, joint_velocities, joint_efforts, quarantined, down, contacts, refused, unmoved, "
          "clamped, nearest to contact is contacts)"),
     ],
@@ -141,7 +141,7 @@ def test_names_that_begin_with_a_vowel_have_their_article(site: Path) -> None:
     written(site, "model('omni', RobotSettings)(Own)")
     assert problems("robots.camera={model: 'own_form:Own', sensors: {own: {kind: encoder, rate: 100 Hz}}}",
                     "players={}") == [
-        "robots.camera.sensors.own.kind: sensor that an omni cannot carry, which has no joint_positions (valid on: "
+        "robots.camera.sensors.own.kind: sensor that an omni cannot carry, for lack of joint_positions (valid on: "
         "differential_drive with dynamics: rigid, rod), 'encoder'"
     ]  # fmt: skip
 
@@ -198,7 +198,7 @@ KITS: Final = {
     "spares=lambda section: {'egg': 'ball'}": [],
     "entities={'leo': 'rod'}": ["its entity leo is of the model rod, which is one of robots: these have owners, and "
                                 "are in robots:"],
-    "entities={'leo': 'beest'}": ["its entity leo is of a model that is not there: unknown model (there are: "
+    "entities={'leo': 'beest'}": ["its entity leo is of an unknown model: unknown model (there are: "
                                   f"{installed('model')}, or any module:Class), 'beest'"],
     "entities={'leo': 'crate'}": ["its entity leo is a rigid model with couples=False, which is valid of rod, ball "
                                   "alone"],
@@ -212,7 +212,7 @@ KITS: Final = {
     "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: there is no module own_none (it is neither beside the "
                                                "deployment nor on PYTHONPATH), 'own_none:X', nearest is 'own_form:X'"],
     "rules={'feed': {'kind': 'in-hall'}}": ["its rule feed: rule of worlds of a hall in a world without one"],
-    "spares=lambda section: {'leo': 'lion'}": ["its entity leo is of a model that is not there: unknown model (there "
+    "spares=lambda section: {'leo': 'lion'}": ["its entity leo is of an unknown model: unknown model (there "
                                                f"are: {installed('model')}, or any module:Class), 'lion'"],
     "spares=lambda section: {'leo': 'beast'}": ["leo, a spare that could not be absent: a beast without a place of its "
                                                 "own"],

@@ -25,8 +25,8 @@ def test_a_page_has_a_recording_beside_it_whose_path_holds_in_any_folder(
 @pytest.mark.parametrize(
     ("console", "second", "offset", "detached", "said"),
     [
-        (False, "x.csv", None, False, "--second goes with --console, 'x.csv'"),
-        (False, None, "1s", False, "--offset goes with --console, '1s'"),
+        (False, "x.csv", None, False, "--second is valid with --console only, 'x.csv'"),
+        (False, None, "1s", False, "--offset is valid with --console only, '1s'"),
         (True, None, None, True, "--console and --detach exclude each other"),
         (True, None, "1s", False, "--offset needs --second, '1s'"),
         (True, __file__, "soon", False, "--offset: not a time"),

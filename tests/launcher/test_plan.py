@@ -104,9 +104,9 @@ def test_ports_that_are_taken_and_paths_that_are_no_text_are_refused_before_anyt
             said = refusal(RunOptions(TABLE, listen=f"127.0.0.1:{first}"))
             assert said.startswith("cannot listen on tcp/127.0.0.1:") and "take another port (--listen" in said
     name = os.fsdecode(b"caf\xe9")
-    assert "a path that is not UTF-8, '" in refusal(RunOptions(TABLE), Path(f"{name}.mcap"))
+    assert "path is not valid UTF-8, '" in refusal(RunOptions(TABLE), Path(f"{name}.mcap"))
     (tmp_path / f"{name}.yaml").write_bytes(TABLE.read_bytes())
-    assert "a path that is not UTF-8, '" in refusal(RunOptions(Path(f"{name}.yaml")))
+    assert "path is not valid UTF-8, '" in refusal(RunOptions(Path(f"{name}.yaml")))
     assert [one.name for one in tmp_path.iterdir()] == [f"{name}.yaml"]
 
 

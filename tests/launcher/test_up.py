@@ -105,7 +105,7 @@ def test_what_follows_when_a_node_ends(
     up._launcher.children["red"].process.wait()
     assert up._ends_run(up._launcher.children["red"]) == ends_run
     for now_s in (0.0, 1.0, 1.0):
-        up._restart_ended(now_s, knows=True)
+        up._restart_ended(now_s, has_status=True)
         up._launcher.children["red"].process.wait()
     assert (tmp_path / "node.log").read_text().count("started") == starts
     is_given_up = has_begun and ends == "exit 3"
@@ -330,9 +330,9 @@ def test_a_player_is_started_again_when_a_signal_has_ended_it(
 
     def go_on() -> int:
         nonlocal now_s
-        up._restart_ended(now_s, knows=True)
+        up._restart_ended(now_s, has_status=True)
         now_s += max(WAITS_S)
-        up._restart_ended(now_s, knows=True)
+        up._restart_ended(now_s, has_status=True)
         up._launcher.children["player-red"].process.wait()
         return (tmp_path / "player.log").read_text().count("started")
 
@@ -354,7 +354,7 @@ def test_a_node_that_is_started_before_it_has_ended_starts_again(launched: Launc
     (tmp_path / "node.go").touch()
     for now_s in (0.0, max(WAITS_S), 2 * max(WAITS_S), 3 * max(WAITS_S)):
         up._launcher.children["red"].process.wait()
-        up._restart_ended(now_s, knows=True)
+        up._restart_ended(now_s, has_status=True)
     up._launcher.children["red"].process.wait()
     assert (tmp_path / "node.log").read_text().count("started") == 2, "once for the word, and then it is refused"
 

@@ -190,7 +190,7 @@ def test_a_number_that_is_not_finite_is_blamed_on_its_sender(field: str, bad: fl
     numbers[-1] = bad
     parts["n2"] = msgspec.structs.replace(parts["n2"], **{field: numbers.tobytes()})
     text, nodes = blamed(parts, slots)
-    assert nodes == ("n2",) and text == f"tick {TICK}: numbers of n2 that are not finite"
+    assert nodes == ("n2",) and text == f"tick {TICK}: non-finite numbers of n2"
 
 
 def test_great_numbers_are_finite_although_their_sum_is_not() -> None:

@@ -120,7 +120,7 @@ def test_a_member_asks_until_all_is_there_and_lives_meanwhile(pinned: str) -> No
     member.begin_anew()
     assert member.take_build(build), "nothing is asked for again"
     member.begin_anew()
-    assert not member.take_build(replace(build, run="other")) and "of another run, other" in member.refusal
+    assert not member.take_build(replace(build, run="other")) and "of run other" in member.refusal
 
 
 def test_a_member_that_begins_anew_in_between_starts_over(pinned: str) -> None:

@@ -183,4 +183,4 @@ def test_the_commands_say_where_a_run_begins(captured: Captured, tmp_path: Path)
     shown = runner.invoke(replay_app, ["info", str(branch)])
     assert "\n  from: alone.mcap\n" in shown.output and "\n  ticks 190 to 210 of 2 ms, 0.04 s" in shown.output
     shown = runner.invoke(replay_app, ["verify", str(branch)])
-    assert shown.exit_code == 0 and shown.output.startswith("equal: 20 ticks behind frame 190 simulated again")
+    assert shown.exit_code == 0 and shown.output.startswith("equal: 20 ticks after frame 190 simulated again")

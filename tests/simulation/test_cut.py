@@ -96,7 +96,7 @@ def test_verify_refuses_it_and_a_run_begins_with_its_frames(run: Path, part: Pat
     done = replay("verify", part)
     assert done.code == 2 and "a cut of run.mcap from tick 120 on" in done.err and "verify run.mcap" in done.err
     found = replay("verify", part, "--from-first-frame", "--nodes", "3")
-    assert found.out.startswith("equal: 80 ticks behind frame 120 simulated again on 3 nodes, digest of all ticks ")
+    assert found.out.startswith("equal: 80 ticks after frame 120 simulated again on 3 nodes, digest of all ticks ")
     assert found.out.rstrip().endswith(capture_info(part).chain)
     deployment = load_deployment(open_capture(run).about.deployment_text, "table.yaml")
     for at in ("240 ms", "0.33 s", "400 ms"):
@@ -121,7 +121,7 @@ def refusals(run: Path, tmp_path: Path) -> Iterator[tuple[tuple[str | Path, ...]
     out = tmp_path / "o.mcap"
     yield (run, "--from", "10 s", "-o", out), "--from: the capture ends at 0.6 s, '10 s'"
     yield (run, "--from", "0.2", "-o", out), "--from: not a time"
-    yield (run, "--to", "-1 s", "-o", out), "--to: a time that is not negative is needed"
+    yield (run, "--to", "-1 s", "-o", out), "--to: negative; a time is at least 0"
     yield (run, "--from", "300 ms", "--to", "200 ms", "-o", out), "--to: before --from, which is 300 ms, '200 ms'"
     yield (run, "-o", run), "exists already; a capture is never overwritten"
     yield (run, "-o", run / "o.mcap"), "cannot be created, File exists"

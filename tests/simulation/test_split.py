@@ -95,5 +95,5 @@ def test_the_last_seconds_are_played_cut_and_told(split: Path, run: Path, tmp_pa
         assert replay("cut", source, "--from", "0.45 s", "--to", "0.55 s", "-o", tmp_path / out).code == 0
     assert diff_captures(tmp_path / "a.mcap", tmp_path / "b.mcap").equal
     done = replay("verify", path, "--from-first-frame")
-    assert done.code == 0 and done.out.startswith("equal: 100 ticks behind frame 200 simulated again")
+    assert done.code == 0 and done.out.startswith("equal: 100 ticks after frame 200 simulated again")
     assert replay("report", path, "-o", tmp_path / "r.html").code == 0

@@ -308,7 +308,9 @@ def test_a_lockstep_client_whose_connection_closes_is_lost(silent_ms: int, known
 
 def presence_ends(process: str) -> Seen:
     seen = Seen(ticks=600)
-    seen.prepare = lambda system: system.at_tick(60, lambda: system.supervisor.process_gone(process, system.bus.now_ns))
+    seen.prepare = lambda system: system.at_tick(
+        60, lambda: system.supervisor.connection_closed(process, system.bus.now_ns)
+    )
     return seen.go()
 
 

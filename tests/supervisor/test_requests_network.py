@@ -30,7 +30,7 @@ SECOND_NS: Final = 10**9
         ([], ["not an event, which is a mapping, a list of 0"]),
         ({}, ["missing key: one of partition, clog, set, heal, 'heal'"]),
         ({"heal": "al"}, ["heal: not one of all, partitions, clogs, settings, 'al', nearest is 'all'"]),
-        ({"heal": "all", "at": "3 s"}, ["an event that is asked for happens at the next tick, it has no time, 'at'"]),
+        ({"heal": "all", "at": "3 s"}, ["a requested event happens at the next tick and has no time, 'at'"]),
         ({"heal": "all", "for": "3 s"}, ["heal happens at once, 'for'"]),
         ({"partition": [["player-rde"], ["rest"]]}, [
             "partition[0][0]: a selector that matches no endpoint, 'player-rde', nearest is 'player-red'",
@@ -100,7 +100,7 @@ def test_it_happens_to_what_is_sent_from_the_tick_of_the_answer_on() -> None:
     status = decode_json(_answer(rehearsed.answers, statuses).result)
     assert isinstance(status, dict)
     assert status["disruptions"] == {
-        "asked": 2,
+        "count": 2,
         "last": [
             {"tick": cut.tick, "event": {"partition": [["camera"], ["player-*"]]}},
             {"tick": healed.tick, "event": {"heal": "all"}},

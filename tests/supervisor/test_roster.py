@@ -62,7 +62,7 @@ def test_a_name_is_free_until_somebody_has_it() -> None:
     twin = msgspec.structs.replace(HELLO, boot="boot-2")
     assert roster.reason_against(twin) == "a node red is already here"
     assert roster.reason_against(msgspec.structs.replace(twin, name="blue")) == ""
-    assert roster.take(HELLO, 9) is roster.by_name["red"] and roster.by_name["red"].heard_ns == 5
+    assert roster.take(HELLO, 9) is roster.by_name["red"] and roster.by_name["red"].last_message_ns == 5
 
 
 def test_who_has_the_name_of_a_process_that_is_silent_is_asked_to_wait() -> None:

@@ -141,7 +141,7 @@ class Membership(RuleBasedStateMachine):
     @rule(node=st.sampled_from(NODES))
     def gone(self, node: str) -> None:
         self.now_ns += 1
-        self.core.process_gone(node, self.now_ns)
+        self.core.connection_closed(node, self.now_ns)
         self.hear()
         if self.state[node] in (KNOWN, MEMBER):
             self.depart(node)

@@ -78,7 +78,7 @@ def test_a_node_that_was_cut_off_while_players_start_takes_part() -> None:
     for player in ("player-red", "player-blue"):
         run.system.pause(player, 12 * S)
     run.system.later(2 * S, lambda: run.system.pause("n1", 4 * S))
-    run.system.later(3 * S, lambda: run.core.process_gone("n1", run.system.bus.now_ns))
+    run.system.later(3 * S, lambda: run.core.connection_closed("n1", run.system.bus.now_ns))
     begun: list[bool] = []
     run.system.later(11 * S, lambda: begun.append(run.core.status(0)["begun"]))
     run.go()

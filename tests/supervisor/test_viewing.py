@@ -180,8 +180,8 @@ def test_a_status_has_what_was_asked_for_last_also_after_a_loss_of_the_superviso
         "accepted": True,
     }
     deployment = system.supervisor.state.deployment
-    kept = list(system.supervisor.state.asked)
-    assert fold(deployment, system.journal).asked == kept == fold(deployment, heads).asked
+    kept = list(system.supervisor.state.last_requests)
+    assert fold(deployment, system.journal).requests == kept == fold(deployment, heads).requests
 
 
 # --- a core alone ----------------------------------------------------------------------------------------------------

@@ -270,7 +270,7 @@ def test_so_much_is_looked_at_together_and_no_more() -> None:
     run.do(20, lambda: answers.extend(ask("watch", 0, {"links": links}, who) for who, links in asked)).go()
     told = [run.system.answers[identity] for identity in answers]
     assert [answer.accepted for answer in told] == [True, True, False]
-    assert told[2].text == "links: at most 64 are looked at at once, these would make 90"
+    assert told[2].text == "links: at most 64 can be watched at once, these would be 90"
 
 
 def test_a_report_of_what_is_looked_at_has_a_size() -> None:

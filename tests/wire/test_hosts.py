@@ -15,7 +15,7 @@ import pytest
 from foosim.capture.info import capture_info
 from foosim.deployment.loader import apply_sets
 from foosim.launcher import doctor as doctor_remote
-from foosim.launcher.doctor import LIMIT_S, Question, ask
+from foosim.launcher.doctor import LIMIT_S, Question, checks_of
 from foosim.launcher.hosts import Remote
 from tests.apart import apart
 from tests.wire import sshd
@@ -99,7 +99,7 @@ def test_hosts_are_examined_get_their_certificates_and_run(other: There, house: 
 
 def why_silent(remote: Remote, limit_s: float = LIMIT_S) -> tuple[str, str]:
     """What is said, and said to do, of a host that does not answer."""
-    (finding,) = ask(remote, Question("there", "", "", "", False, "", "", ""), limit_s)
+    (finding,) = checks_of(remote, Question("there", "", "", "", False, "", "", ""), limit_s)
     assert (finding.subject, finding.state, finding.host) == ("127.0.0.1", "problem", "there")
     return finding.text, finding.remedy
 

@@ -65,8 +65,8 @@ def test_a_setting_takes_what_a_file_takes() -> None:
         ("{loss: -1 dB}", "radio.loss: out of range 0 dB to 200 dB, '-1 dB'"),
         ("{thickness: 6 mm}", "radio: missing key of a material, unless it has a loss, 'is'"),
         ("{is: null}", "radio: missing key of a material, unless it has a loss, 'is'"),
-        ("{is: wood, loss: 5 dB}", "radio: a loss holds whatever it is made of: not beside one, 'is'"),
-        ("{loss: 5 dB, thickness: 1 cm}", "radio: a loss holds whatever it is made of: not beside one, 'thickness'"),
+        ("{is: wood, loss: 5 dB}", "radio: no effect beside loss, which holds for any material, 'is'"),
+        ("{loss: 5 dB, thickness: 1 cm}", "radio: no effect beside loss, which holds for any material, 'thickness'"),
         ("[wood]", "radio: not a mapping, a list of 1"),
     ],
 )  # fmt: skip

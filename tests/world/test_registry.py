@@ -614,7 +614,7 @@ def test_a_model_that_lacks_what_a_component_needs_is_refused() -> None:
         apply_sets(TEXT, "t.yaml", ["robots.camera.sensors.own={kind: 'own_tellers:Teller', rate: 100 Hz}"])
     (problem,) = error.value.problems
     assert problem.endswith(
-        "robots.camera.sensors.own.kind: sensor that a camera cannot carry, which has no joint_positions "
+        "robots.camera.sensors.own.kind: sensor that a camera cannot carry, for lack of joint_positions "
         "(valid on: differential_drive with dynamics: rigid, rod), 'own_tellers:Teller'"
     )
 

@@ -137,7 +137,7 @@ def test_what_a_component_needs_is_looked_for_in_the_robots_own_state(folder: Pa
     with pytest.raises(DeploymentError) as refused:
         pin_assets(text_with(arm), NAME, folder)
     (problem,) = refused.value.problems
-    assert "robots.arm.sensors.where.kind: sensor that an urdf cannot carry, which has no position, heading" in problem
+    assert "robots.arm.sensors.where.kind: sensor that an urdf cannot carry, for lack of position, heading" in problem
 
 
 def test_a_free_robot_needs_a_mass(folder: Path) -> None:
