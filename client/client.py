@@ -163,7 +163,7 @@ class Actuator:
 
         `foosim components actuator KIND` explains the numbers of its kind. In lockstep a command is
         sent at the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps
-        its last command. Raises BadValue for names and numbers that are none of a command; NotJoined, RunEnded.
+        its last command. Raises BadValue for unknown fields and invalid numbers; NotJoined, RunEnded.
         """
         taker = self._client._encoder.actuator(self._robot, self._channel)
         if numbers and named:
@@ -367,8 +367,8 @@ class Client:
     def command(self, commands: Commands) -> None:
         """Command robots, by name: `{"robot-1": {"v": 0.5, "w": 0.0}}`; see `Actuator.set`.
 
-        Raises UnknownName for a robot or an actuator, BadValue for names and numbers that are none of a command;
-        NotJoined, RunEnded.
+        Raises UnknownName for a robot or an actuator, BadValue for unknown fields and invalid numbers; NotJoined,
+        RunEnded.
         """
         for robot, command in sorted(commands.items()):
             for channel, payload in self._encoder.encode(robot, command):
@@ -503,12 +503,12 @@ class Client:
             if timeout_s is not None and passed_s >= timeout_s:
                 raise JobUnfinished(f"{job.what}: job {job.number} has not ended within {timeout_s:g} s")
             if self._period:
-                self._go_on()
+                self._next_tick()
             else:
                 self.receive(AGAIN_S)
 
-    def _go_on(self) -> None:
-        """In the body of a loop in lockstep: answer its tick, and come to the next one."""
+    def _next_tick(self) -> None:
+        """In the body of a loop in lockstep: answer its tick, and continue to the next one."""
         core = self._core
         self._check_sending()
         self._answer()
@@ -539,7 +539,7 @@ class Client:
         if self._core.ended:
             raise RunEnded("the run is over")
         if self._period is None:
-            raise NotJoined("a client that has not joined cannot send: lockstep() or listen() first")
+            raise NotJoined("the client has not joined: call lockstep() or listen() before sending")
 
     def _sample(self, robot: str, channel: str) -> Sample | None:
         if self._period is not None and (robot, channel) not in self._subscriptions:
@@ -588,13 +588,11 @@ def connect(
     """Connect to a run as the declared client `name`.
 
     `address` is `run:newest` or `run:NAME` for a run of this user on this machine, else that of the vHub's radio plane,
-    `tcp/HOST:PORT`.
-    `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
+    `tcp/HOST:PORT`. `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
     `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key. Raises BadValue for
-    a name or address that is none, CertificateError for a folder without valid certificates, NoRun for a run that is
-    not live, ConnectionFailed without
-    an answer within `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will
-    not have the client.
+    an invalid name or address, CertificateError for a folder without valid certificates, NoRun without such a live run,
+    ConnectionFailed without an answer within `timeout_s` (wall time), NotAuthorised and ConnectionRefused,
+    with the reason, when the vHub rejects the client.
     """
     if not is_name(name):
         raise BadValue("not a name for a client", name)

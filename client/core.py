@@ -68,7 +68,7 @@ class ClientStatistics:
     unsent: int = 0
     """Packets that were not sent, since too many wait to be recorded."""
     returns: int = 0
-    """How often it went on after the vHub was gone."""
+    """The count of returns after a loss of the vHub."""
 
 
 class ClientCore:
@@ -428,7 +428,7 @@ class ClientCore:
             self._resend_ns = NEVER_NS
 
     def _resend(self, whole: bool) -> None:
-        """Repeat the packets that are not recorded: all, or as many as fit one message."""
+        """Repeat the unrecorded packets: all, or as many as fit one message."""
         for part in split(self._unrecorded, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part)))
             if not whole:

@@ -27,7 +27,7 @@ from foosim.world.sensors.job import Jobs as Reading
 from foosim.world.sensors.job import JobSettings
 
 REPEAT_NS: Final = 100_000_000
-"""Simulated time after which a command is sent again that is not known to have been taken."""
+"""Simulated time after which a command without a known effect is sent again."""
 ENDS: Final[dict[JobState, type[JobError]]] = {
     JobState.FAILED: JobFailed,
     JobState.PREEMPTED: JobPreempted,
@@ -94,19 +94,19 @@ class Jobs:
         self.senders: Final = deployment.senders_to(robot)
         if sender not in self.senders:
             raise UnknownName(f"{self.what} takes no jobs of it", sender, self.senders)
-        telling = {
+        reporting = {
             channel for channel, one in its.sensors.items() if isinstance(one, JobSettings) and one.actuator == actuator
         }
-        if not telling:
+        if not reporting:
             raise BadValue(f"{robot} has no sensor of the kind job for its actuator", actuator)
         if sender in deployment.players:
             heard = {channel for endpoint, channel in deployment.heard_by(sender) if endpoint == robot}
-            if telling.isdisjoint(heard):
+            if reporting.isdisjoint(heard):
                 raise BadValue(
-                    f"{sender} does not hear {' or '.join(sorted(telling))} of {robot}, the sensor of", actuator
+                    f"{sender} does not hear {' or '.join(sorted(reporting))} of {robot}, the sensor of", actuator
                 )
-            telling &= heard
-        self.heard: Final = (robot, min(telling))
+            reporting &= heard
+        self.heard: Final = (robot, min(reporting))
         """The (robot, channel) that reports their states."""
         self.sender, self.robot, self.actuator = sender, robot, actuator
         self._row = self.senders.index(sender)
@@ -123,7 +123,7 @@ class Jobs:
     def call(self, *numbers: Any, **named: Any) -> Job:
         """Begin a job, by the numbers of a command in their order or by name; it is sent by `commands`.
 
-        Raises BadValue for names and numbers that are none of a command.
+        Raises BadValue for unknown fields and invalid numbers.
         """
         if numbers and named:
             raise self._taker.wrong("numbers are given by name or in their order, not both")

@@ -96,7 +96,7 @@ def _unfit(made: Any, name: str) -> str:
     if not issubclass(made, Player):
         return f"{name} is no Player{place_of_code(made)}; write: from foosim import Player, class {name}(Player):"
     if inspect.isabstract(made):
-        return f"{name} is abstract: none can be made of it"
+        return f"{name} is abstract: it cannot be instantiated"
     taken = _other_arguments(made, *MADE_WITH)
     if taken:
         return f"{name} cannot be made with ({', '.join(MADE_WITH)}): its constructor takes {taken}"

@@ -64,7 +64,7 @@ class Acting:
     ) -> None:
         """`tick` is the newest tick that is known, for messages.
 
-        Raises PlayerError for a name that is not declared, and for a player that cannot be loaded or made.
+        Raises PlayerError for an undeclared name, and for a player that cannot be loaded or created.
         """
         if name not in deployment.players:
             raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)

@@ -11,7 +11,7 @@ from foosim.simulation.verify import Verified, verify_capture
 
 
 class Capture(reader.CaptureData):
-    """A capture, opened: its frames, packets, poses and rows as they are asked for."""
+    """A capture, opened: its frames, packets, poses and rows read on demand."""
 
     def info(self) -> CaptureInfo:
         """Return it in short: ticks, chain, packets by fate. Raises CaptureError."""

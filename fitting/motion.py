@@ -1,4 +1,4 @@
-"""How a ball goes on over a level floor between straight walls: in flights, slides and rolls, each of closed form.
+"""Motion of a ball over a level floor between straight walls: flights, slides and rolls, each in closed form.
 
 A sphere, I = 2/5 m r^2, with Coulomb's friction at floor and walls and Newton's restitution. Frame of reference: that
 of the table, x along, y across, z up; the ball's height is that of its lowest point over the floor. SI units. The
@@ -41,7 +41,7 @@ class Pairs(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Field:
     """Where the middle of a ball can be, |x| <= `x` and |y| <= `y` (m); the ball's radius (m); gravity (m/s2); and the
-    restitution of floor and ball, which is not fitted."""
+    fixed restitution of floor and ball."""
 
     x: float
     y: float

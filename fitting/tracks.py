@@ -1,7 +1,7 @@
 """Reads measured tracks of a ball from CSV.
 
 The header names the columns, each quantity with its unit: `time [s]`, `x [mm]`, `y [mm]`, or `time_s`, `x_mm`, `y_mm`;
-`t` stands for `time`. A column `track` tells tracks of one file apart; without one, a file is a track. Other columns
+`t` is short for `time`. A column `track` separates tracks of one file; without one, a file is a track. Other columns
 are passed over. Places are in the table's frame of reference.
 """
 

@@ -47,7 +47,7 @@ BOX_TRIANGLES: Final = np.array(
     np.int32,
 )
 LEVEL_DIGITS: Final = 6
-"""Heights of faces are rounded to so many digits of a metre: those at one level are at one height."""
+"""Heights of faces are rounded to this count of digits of a metre: faces at one level have one height."""
 
 
 class Covered(NamedTuple):

@@ -114,7 +114,7 @@ class Flight:
     def _torques(self, at: Navigation, wanted: Vector, yaw: float) -> Vector:
         """Return the torques (N m, own axes) that turn z along the wanted force, and x to the heading.
 
-        The error of the attitude is half of the part of R_d^T R that is not symmetric.
+        The error of the attitude is half of the skew-symmetric part of R_d^T R.
         """
         length = _length(wanted)
         z = wanted[0] / length, wanted[1] / length, wanted[2] / length

@@ -113,12 +113,12 @@ class Playing:
         for hand in self._hands:
             if hand.rod.seen:
                 command = hand.move(sight, arrives * self._tick_ns * 1e-9, goal)
-                hand.rod.tell(command, arrives)
+                hand.rod.note(command, arrives)
                 commands[hand.rod.name] = command
         return commands
 
     def _aim(self, tick: int) -> float:
-        """Return the y at which shots aim in this quarter of a second: a keyed draw, so that nobody can tell."""
+        """Return the y at which shots aim in this quarter of a second: a keyed draw, so that it is unpredictable."""
         word = draw_words(self._aim_key, tick * self._tick_ns // AIM_NS)[0]
         return self._aim_y if word & 1 else -self._aim_y
 

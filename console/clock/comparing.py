@@ -41,9 +41,9 @@ async def compare(feed: Feed, clock: Clock, one: Compare, other: Open, covers: C
             assert isinstance(clock, Deck), "a recording is compared on a deck"
             contents = _on_deck(clock, Comparison(await in_pool(one), await in_pool(other), clock.tick_ns), in_pool)
         async for content in contents:
-            feed.tell({"type": "compared", "covers": covers(), **content})
+            feed.publish({"type": "compared", "covers": covers(), **content})
     except CaptureError as error:
-        feed.tell({"type": "note", "level": "error", "text": f"the comparison ends: {error}"})
+        feed.publish({"type": "note", "level": "error", "text": f"the comparison ends: {error}"})
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 

@@ -71,8 +71,8 @@ class Leader:
         self._is_looked_at = wanted.readers > 0
         self.source.want(wanted)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
-        return await self.source.ask(verb, arguments, who)
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        return await self.source.request(verb, arguments, who)
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         return await self.source.history(curve)
@@ -116,5 +116,5 @@ class _Overheard:
         self._feed.show(moment)
         self._leader.shown(moment)
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        self._feed.tell(message)
+    def publish(self, message: Mapping[str, Any]) -> None:
+        self._feed.publish(message)

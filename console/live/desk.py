@@ -32,7 +32,7 @@ class Desk:
     """The jobs of one connection. One that begins anew finds the last job of the one before."""
 
     def __init__(self, client: Client, deployment: Deployment, layout: Layout) -> None:
-        """Join, and hear all sensors that tell of jobs; `deployment` has the contents of its files."""
+        """Join, and receive all sensors that report jobs; `deployment` has the contents of its files."""
         self._client = client
         encoder = CommandEncoder(deployment)
         reported = {robot: jobs_of(deployment, robot) for robot in sorted(deployment.robots)}
@@ -48,7 +48,7 @@ class Desk:
     def send(self, robot: str, actuator: str, numbers: Mapping[str, Any]) -> str:
         """Give a job, by the numbers of a command; return the request in words. It preempts the one that runs.
 
-        Raises UnknownName for an actuator without jobs, BadValue for numbers that are none of a command or beyond its
+        Raises UnknownName for an actuator without jobs, BadValue for numbers that a command does not have or beyond its
         limits, NotJoined, RunEnded and ConnectionFailed.
         """
         taker = self._takers[self._found(robot, actuator)]
@@ -80,7 +80,7 @@ class Desk:
         self._client.receive(AGAIN_S)
 
     def jobs(self) -> list[dict[str, Any]]:
-        """Return how the jobs stand, as pages read it: of each actuator with a job of this client."""
+        """Return the states of the jobs of this client, one for each actuator with a job, as pages read them."""
         found = ((pair, self._job(pair)) for pair in self._takers)
         return [self._reported(*pair, job) for pair, job in found if job is not None]
 

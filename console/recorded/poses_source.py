@@ -19,7 +19,7 @@ from foosim.console.clock.deck import VERBS, Clock, Deck
 from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.poses_csv import BadPoses, read_tracks
 from foosim.console.shown.scene_json import scene_content
-from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, NotAsked, Wanted
+from foosim.console.shown.source import About, Answered, Curve, Feed, InvalidRequest, Moment, Wanted
 from foosim.console.shown.tracks import Pose, Track
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import build_scene
@@ -32,7 +32,7 @@ MARKER_COLOUR: Final = (0.9, 0.6, 0.1, 1.0)
 UNSEEN_HZ: Final = 2.0
 BYTES_MAX: Final = 4 * 1024**3
 NOWHERE: Final = (nan,) * 7
-"""The pose of a link that has none at a time."""
+"""The pose of a link without one at a time."""
 
 
 def load_tracks(path: Path) -> dict[str, Track]:
@@ -118,10 +118,10 @@ class PosesSource:
             period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
             await clock.wait(None if clock.paused else clock.clock_ns() + period_ns, seen)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         if self._deck is None:
-            raise NotAsked("recorded poses follow the first source: ask that one")
-        return self._deck.ask(verb, arguments, lambda tick, later: tick + (1 if later else -1))
+            raise InvalidRequest("recorded poses follow the first source: send the request to that one")
+        return self._deck.request(verb, arguments, lambda tick, later: tick + (1 if later else -1))
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         return "", "", []

@@ -45,15 +45,15 @@ equal in its digest, or what was captured last before it."""
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is seen at a requested tick. `tick` is that of what is shown, `frame` the newest up to it."""
+    """The view at a requested tick. `tick` is the one shown, `frame` the newest up to it."""
 
-    asked: int
+    requested: int
     tick: int
     kind: Kind
     poses: NDArray[np.float32]
     frame: Frame | None
     values: NDArray[np.float64]
-    """The numbers of that frame that are shown; not a number where there is none yet."""
+    """The shown numbers of that frame; NaN before the first."""
 
 
 class Recording:

@@ -204,7 +204,7 @@ class Board:
         for reader in self.readers.values():
             reader.show(state.shown, now_s)
 
-    def tell(self, source: int, message: Mapping[str, Any]) -> None:
+    def publish(self, source: int, message: Mapping[str, Any]) -> None:
         state, kind = self._states[source], message["type"]
         whole = {"source": source, **message}
         if kind == "overlay":
@@ -259,5 +259,5 @@ class SourceFeed:
     def show(self, moment: Moment) -> None:
         self._board.show(self._source, moment)
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        self._board.tell(self._source, message)
+    def publish(self, message: Mapping[str, Any]) -> None:
+        self._board.publish(self._source, message)

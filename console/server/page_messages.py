@@ -34,8 +34,8 @@ class Hello(_Message, frozen=True, tag="hello"):
     token: Annotated[str, Meta(max_length=128)]
 
 
-class Ask(_Message, frozen=True, tag="ask"):
-    """Something is to be done; the answer has the same id."""
+class PageRequest(_Message, frozen=True, tag="request"):
+    """A verb for a source; the answer has the same id."""
 
     id: Number
     verb: Text
@@ -86,7 +86,7 @@ class Plot(_Message, frozen=True, tag="plot"):
     """Of the scene whose fields are meant: of another one than the newest none are sent."""
 
 
-Message = Hello | Ask | Show | Watch | Plot
+Message = Hello | PageRequest | Show | Watch | Plot
 _decoder: Final[msgspec.json.Decoder[Message]] = msgspec.json.Decoder(Message)
 
 

@@ -1,4 +1,4 @@
-"""The points of plotted curves that are not numbers of the frame: figures of links, values of the status, readings."""
+"""The points of plotted curves from outside of the frame: figures of links, values of the status, readings."""
 
 from __future__ import annotations
 

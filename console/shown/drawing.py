@@ -88,7 +88,7 @@ class Poser:
         return shown
 
     def _absent(self, values: NDArray[np.float64]) -> list[int]:
-        """Return who is absent, by the place among those who can be."""
+        """Return the places of absent entities in the list of entities that can be absent."""
         found: list[int] = np.flatnonzero(values[self._flags]).tolist()
         return found
 

@@ -1,7 +1,7 @@
 """Events of a run as marks on its time line: effects of the world's rules, requests, losses.
 
-The rules leave their memory in frames, so they tell from these what they did, to the tick, also where only every tenth
-frame is there. Pure, and bounded whatever the length of the run.
+The rules keep their memory in frames, so marks are exact to the tick also with every tenth frame only. Pure, and
+bounded for any length of the run.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class WorldEvents:
         self._before: Frame | None = None
 
     def take(self, frame: Frame) -> list[Mark]:
-        """Return what happened since the frame before; a frame that is not later begins anew."""
+        """Return what happened since the frame before; an earlier or equal frame begins anew."""
         before, self._before = self._before, frame
         if before is None or frame.tick <= before.tick:
             return []

@@ -1,7 +1,7 @@
 """A gripper: it takes an object that is near a place on a link, and holds it as it is.
 
 A grasp is a weld between the link and the object, of the engine. The frame has what is held and its pose in the frame
-of the link at the grasp; so whoever solves the two next holds them by the same.
+of the link at the grasp; so each node that solves the two next holds them by the same.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ HALF: Final = 0.5
 
 
 class GraspFailure(IntEnum):
-    """Why a gripper took nothing when it was last told to close."""
+    """Why a gripper took nothing at the last command to close."""
 
     NONE = 0
     OUT_OF_REACH = 1
@@ -78,7 +78,7 @@ class Grip(Struct, frozen=True):
     jobs=True,
 )
 class Gripper(Actuator):
-    """Takes the nearest object in its reach when it is told to close, and lets it go when it is told to open.
+    """Takes the nearest object in its reach at a command to close, and releases it at a command to open.
 
     A job to close is done when it holds something, and fails where it can take nothing; one to open is done at once.
     """
@@ -111,7 +111,7 @@ class Gripper(Actuator):
 
     @staticmethod
     def check(settings: GripperSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a link that is not there, an engine without grasps, a robot that it does not
+        """Raise IncompatibleComponent for an unknown link, an engine without grasps, a robot that it does not
         solve."""
         having = [name for name in registry.engines() if ENGINES[name].grasps]
         if not at.spec.engine_type.grasps:
@@ -127,7 +127,7 @@ class Gripper(Actuator):
         return {"closed": (0.0, 1.0)}
 
     def accept(self, command: Grip, view: WritableView) -> bool:
-        """Close or open. A robot in quarantine, which nobody solves, does neither."""
+        """Close or open. A robot in quarantine, which no node solves, does neither."""
         if view.read(self._quarantined)[0] > 0.0:
             view.write(self._failure, GraspFailure.QUARANTINED)
             return False
@@ -142,7 +142,7 @@ class Gripper(Actuator):
         return True
 
     def progress(self, view: WritableView) -> JobState:
-        """Return whether it holds something, or nothing, as it was told."""
+        """Return DONE if it holds something after a command to close, nothing after one to open; else FAILED."""
         is_holding = view.read(self._held)[0] != NO_ENTITY
         return JobState.DONE if is_holding == (view.read(self._wanted)[0] == 1.0) else JobState.FAILED
 
@@ -174,7 +174,7 @@ class Gripper(Actuator):
         """Leave all as it is: what is held is held without power, too."""
 
     def excite(self, view: WritableView) -> None:
-        """Close, for the small run that tells engines apart."""
+        """Close, for the run that compares engines."""
         self.accept(Grip(1.0), view)
 
     def command(self, view: View) -> Motors:

@@ -2,7 +2,7 @@
 
 The wheels' set-points are v - w track / 2 and v + w track / 2 (Siegwart, Nourbakhsh, Scaramuzza, *Introduction to
 Autonomous Mobile Robots*, section 3.2). Where a wheel would be faster than it can be, both are slower by one factor:
-the robot goes along the arc that was asked for.
+the robot moves along the requested arc.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.wheels import wheels_of
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
-    from foosim.world.moving.asked import MotionsAsked
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
+    from foosim.world.moving.asked import MotionSetPoints
 
 
 class VWSettings(ActuatorSettings):
@@ -60,11 +60,11 @@ class MotionActuator(Actuator):
         view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Drive in a curve, for the small run that tells engines apart."""
+        """Drive in a curve, for the run that compares engines."""
         view.write(self._set_point, 0.5 * self._wheels.speed, 0.3 * self._wheels.turn_rate)
 
     def command(self, view: View) -> Motors:
-        """Return what is asked of the motors of the left and the right wheel (`Wheels.asked`)."""
+        """Return the set-points of the motors of the left and the right wheel (`Wheels.set_points`)."""
         linear, aside = view.numbers[self._at], view.numbers[self._at + 1] * self._half_track
         left, right = linear - aside, linear + aside
         most = self._wheels.speed
@@ -72,11 +72,11 @@ class MotionActuator(Actuator):
         if fastest > most:
             share = most / fastest
             left, right = left * share, right * share
-        return self._wheels.asked(left, right, view)
+        return self._wheels.set_points(left, right, view)
 
     @staticmethod
-    def together(actuators: Sequence[MotionActuator]) -> MotionsAsked:
+    def together(actuators: Sequence[MotionActuator]) -> MotionSetPoints:
         """Return these as one; their robots move by kinematics."""
-        from foosim.world.moving.asked import MotionsAsked
+        from foosim.world.moving.asked import MotionSetPoints
 
-        return MotionsAsked([one._set_point for one in actuators], [one._wheels for one in actuators])
+        return MotionSetPoints([one._set_point for one in actuators], [one._wheels for one in actuators])

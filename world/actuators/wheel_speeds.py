@@ -15,8 +15,8 @@ from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.wheels import wheels_of
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
-    from foosim.world.moving.asked import WheelSpeedsAsked
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
+    from foosim.world.moving.asked import WheelSetPoints
 
 
 class WheelSpeedsSettings(ActuatorSettings):
@@ -53,17 +53,17 @@ class DriveActuator(Actuator):
         view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Drive in a curve, for the small run that tells engines apart."""
+        """Drive in a curve, for the run that compares engines."""
         view.write(self._set_point, 0.3 + 0.01 * (self._set_point.at % 7), 0.4)
 
     def command(self, view: View) -> Motors:
-        """Return what is asked of the motors of the left and the right wheel (`Wheels.asked`)."""
+        """Return the set-points of the motors of the left and the right wheel (`Wheels.set_points`)."""
         left, right = view.read(self._set_point)
-        return self._wheels.asked(left, right, view)
+        return self._wheels.set_points(left, right, view)
 
     @staticmethod
-    def together(actuators: Sequence[DriveActuator]) -> WheelSpeedsAsked:
+    def together(actuators: Sequence[DriveActuator]) -> WheelSetPoints:
         """Return these as one; their robots move by kinematics."""
-        from foosim.world.moving.asked import WheelSpeedsAsked
+        from foosim.world.moving.asked import WheelSetPoints
 
-        return WheelSpeedsAsked([one._set_point for one in actuators], [one._wheels for one in actuators])
+        return WheelSetPoints([one._set_point for one in actuators], [one._wheels for one in actuators])

@@ -25,7 +25,7 @@ Reach = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 km")]
 
 
 class Charger(SpecBase):
-    """A place that charges with `power` whoever is within `radius` of it, seen from above.
+    """A place that charges each robot within `radius` of it, seen from above, with `power`.
 
     It is round about `x`, `y`; with a `tag`, round about each entity that has the tag, wherever that is.
     """

@@ -15,7 +15,7 @@ from foosim.world.forms.forms import BODY, JOINTS
 from foosim.world.forms.registry import model
 from foosim.world.layout import Entity
 from foosim.world.moving.arcs import Arcs, Floats, along_arcs, approached
-from foosim.world.moving.asked import asked_of
+from foosim.world.moving.asked import set_points_of
 from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
@@ -90,8 +90,8 @@ class WheeledMotion(Motion):
         state = batch.state.read_at_start(view)
         place, heading = state[:, 0:3].copy(), state[:, 13].copy()
         speeds, travel = state[:, 14:16].copy(), state[:, 16:18].copy()
-        asked = asked_of(motors, STANDING)
-        targets, rates = asked[:, :, 0], asked[:, :, 1]
+        set_points = set_points_of(motors, STANDING)
+        targets, rates = set_points[:, :, 0], set_points[:, :, 1]
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):

@@ -15,7 +15,7 @@ from foosim.world.forms.forms import BODY
 from foosim.world.forms.registry import model
 from foosim.world.layout import Entity
 from foosim.world.moving.arcs import along_arcs, approached, approached_together
-from foosim.world.moving.asked import asked_of
+from foosim.world.moving.asked import set_points_of
 from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
@@ -72,7 +72,7 @@ class _Batch:
 class HolonomicMotion(Motion):
     """In any direction, along arcs, as far as nothing is in the way.
 
-    The velocity in the base's own frame approaches what is asked of it: the vector in the plane with at most one
+    The velocity in the base's own frame approaches its set-point: the vector in the plane with at most one
     acceleration, the turning with another. With it the base goes along an arc (`moving.arcs`), as far as nothing is in
     the way (`moving.free_way`); it turns where it is blocked.
     """
@@ -95,8 +95,8 @@ class HolonomicMotion(Motion):
         batch, dt, count = self._batch, self._dt, len(entities)
         state = batch.state.read_at_start(view)
         place, heading, velocity = state[:, 0:3].copy(), state[:, 13].copy(), state[:, 14:17].copy()
-        asked = asked_of(motors, STANDING)
-        targets, rates = asked[:, :, 0], asked[:, :, 1]
+        set_points = set_points_of(motors, STANDING)
+        targets, rates = set_points[:, :, 0], set_points[:, :, 1]
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):

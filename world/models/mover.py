@@ -1,4 +1,4 @@
-"""A thing that goes along a path again and again, or once: a door, a conveyor's load, somebody who walks."""
+"""A thing that moves along a path, repeatedly or once: a door, a conveyor's load, a walking person."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class MoverRobot(RobotSettings):
 
     A box has `length`, `width` and `height`, a cylinder `radius` and `height`, a sphere `radius`. The points of `path`
     have each a `time`, or the way between them is gone at `speed`. With `loop` it begins again: with times the last
-    point is where the first is, with a speed it goes there. It waits where it is stopped, and goes on from there.
+    point is where the first is, with a speed it goes there. It waits where it is stopped, and continues from there.
     """
 
     shape: Literal["box", "cylinder", "sphere"] = "box"

@@ -114,7 +114,7 @@ class Urdf(Model):
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
     def excite(self, view: WritableView) -> None:
-        """Set it in motion, for the small run that tells engines apart."""
+        """Set it in motion, for the run that compares engines."""
         if self._body.is_free:
             view.write(self._at.slot("linear_velocity"), 0.5, 0.2, 0.0)
         if self._body.joints:

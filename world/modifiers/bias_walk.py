@@ -21,7 +21,7 @@ STEP, START = 0, 1
 class BiasWalkSettings(ModifierSettings):
     """Adds an offset that walks: `initial` is its standard deviation at the start, `walk` that of a second's change.
 
-    Where nothing is said, it is 0.
+    The default is 0.
     """
 
     initial: PerField | None = None

@@ -32,7 +32,7 @@ class GaussianNoise(Modifier):
     """Adds a normal draw to each number."""
 
     def __init__(self, settings: GaussianNoiseSettings, at: ModifierMounting) -> None:
-        from foosim.common.batched.noise import (  # brings numpy, which those who only read settings need not
+        from foosim.common.batched.noise import (  # brings numpy, which readers of settings do not need
             NoiseAhead,
             NoiseKey,
         )

@@ -68,7 +68,7 @@ class InTheWay:
                 self._upright.append((entity, its.radius + body.speed_limit * tick_s, its.low, its.high))
 
     def stops(self, before: Leaf, after: Leaf, start: Sequence[float]) -> bool:
-        """Whether a leaf cannot go on from one place to another: there it is in something, and deeper than before.
+        """Return whether a leaf is blocked on the way to another place: it would overlap something more than before.
 
         `start` are the numbers at the start of the tick.
         """

@@ -39,7 +39,7 @@ class Path:
         return max(one.way_to(other) / (other.time - one.time) for one, other in pairs)
 
     def after(self, clock: float, time: float) -> float:
-        """Return the clock of a path (s) when some time has passed; behind the end of a path it stands still."""
+        """Return the clock of a path (s) after some time; it stops at the end of the path."""
         clock, last = clock + time, self.times[-1]
         if clock < last:
             return clock

@@ -54,7 +54,7 @@ def upright_of(model: Any) -> Upright:
     if found is not None:
         return found
     body = model.body()
-    assert body is not None, "what has no body meets nothing"
+    assert body is not None, "an entity without a body has no cylinder"
     return around(body)
 
 

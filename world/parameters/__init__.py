@@ -1,1 +1,1 @@
-"""What kits are made from: the settings of their sections, and what follows from these alone."""
+"""The parts of kits: the settings of their sections, and what follows from these alone."""

@@ -201,7 +201,7 @@ class Drive(SpecBase):
 
 
 class Match(SpecBase):
-    """When a match ends: after so much time with a ball in play, or when a team has so many goals, whichever is first.
+    """When a match ends: after `duration` with a ball in play or with `goals` of a team, whichever is first.
 
     Without `duration` there is no limit of time, without `goals` none of goals.
     """
@@ -230,7 +230,7 @@ class Rules(SpecBase):
 
 
 class Table(SpecBase):
-    """The whole table: what is built, what it is made of, what drives it, which rules hold."""
+    """The whole table: its parts, materials, drives and rules."""
 
     gravity: Gravity
     field: Playfield

@@ -134,8 +134,8 @@ class Football(Rule):
         self._count_still(ball, view, x, y)
 
     def _count_goal(self, ball: _Ball, team: int, view: WritableView) -> None:
-        """A goal counts for the team that attacks it, whoever touched the ball last; if that was a rod of the other
-        team, it is that team's own goal."""
+        """A goal counts for the team that attacks it; after a last touch by the other team it is that team's own
+        goal."""
         other = 1 - team
         view.write(self._score, *_one_more(view.read(self._score), team))
         if self._touches.team_of(view.numbers[ball.touched_by.at]) == other:
@@ -179,7 +179,7 @@ class Football(Rule):
         view.write(ball.serve, serve)
 
     def _kick_off(self, ball: _Ball, view: WritableView) -> None:
-        """Roll the ball from where it waits; a direction of which nothing is said is drawn by the kick-off's number."""
+        """Roll the ball from where it waits; an unset direction is drawn by the kick-off's number."""
         (kickoffs,) = view.read(self._kickoffs)
         words = draw_words(self._key, int(kickoffs))
         view.write(self._kickoffs, kickoffs + 1.0)
@@ -308,7 +308,7 @@ class _Ball:
 
 
 class _Touches:
-    """Which rod has touched a ball: what the contact logs of the last tick tell.
+    """Which rod has touched a ball, by the contact logs of the last tick.
 
     A rod touches nothing but balls. So where a ball has a contact and one rod has, too, they are each other's, and the
     ball is within the rod's reach. Of several such rods it is the one that was in contact last, to the substep; of

@@ -3,8 +3,8 @@
 The engine `mujoco` computes what it does to a body, by MuJoCo's inertia box model of a passive medium (MuJoCo's
 documentation, Computation, section "Fluid forces"): the force along each axis of the box that has the body's mass and
 moments of inertia is -density / 2 x A |v| v - 3 pi x viscosity x D v, with v of the body relative to the air, A the
-box's area across that axis and D the mean of its sides; likewise it damps how the body turns. A body behind another one
-is not sheltered. How fast the air goes is in the frame, so it can be set while the world goes on.
+box's area across that axis and D the mean of its sides; likewise it damps how the body turns. No body
+shelters another one. The speed of the air is in the frame, so it can be set during a run.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Viscosity = Annotated[float, Quantity(units.VISCOSITY, "0 Pa s", "10 Pa s")]
 class WindSettings(RuleSettings):
     """How fast the air goes in the world's frame, its density and its dynamic viscosity, by default those of air.
 
-    These are the values that MuJoCo's documentation names for air. `x`, `y` and `z` can be set while the world goes on.
+    These are the values that MuJoCo's documentation names for air. `x`, `y` and `z` can be set during a run.
     """
 
     x: AirSpeed = default("0 m/s")

@@ -63,8 +63,7 @@ class Imu(Sensor):
 
     @staticmethod
     def check(settings: ImuSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a link that the robot does not have, or a robot whose places move nobody
-        knows how."""
+        """Raise IncompatibleComponent for an unknown link, or a robot whose motion at that place is unknown."""
         Mounted(at, settings.at).check_twist()
 
     def sample(self, view: WritableView) -> Inertial:

@@ -66,7 +66,7 @@ class JointPositionActuator(Actuator):
         view.write(self._group.set_point, *self._group.positions(view))
 
     def excite(self, view: WritableView) -> None:
-        """Move each joint by a little, for the small run that tells engines apart."""
+        """Move each joint by a little, for the run that compares engines."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 
     def command(self, view: View) -> Motors:

@@ -27,7 +27,7 @@ Time = Annotated[float, Meta(gt=0.0, le=1e6, extra={"unit": "s"})]
 
 
 class TrajectoryFailure(IntEnum):
-    """Why joints do not follow, or have not followed, the way that they were told last."""
+    """Why joints do not follow, or have not followed, the trajectory of the last command."""
 
     NONE = 0
     POINTS = 1
@@ -116,7 +116,7 @@ class JointTrajectory(Actuator):
         return {}
 
     def problem(self, command: Trajectory) -> str:
-        """Return why a command is refused wherever the joints are; empty for one that is not."""
+        """Return why a command is refused for any state of the joints; empty for a valid one."""
         return self._refusal(command)[1]
 
     def _refusal(self, command: Trajectory) -> tuple[TrajectoryFailure, str]:
@@ -161,7 +161,7 @@ class JointTrajectory(Actuator):
         view.write(self._group.set_point, *self._group.positions(view))
 
     def excite(self, view: WritableView) -> None:
-        """Move each joint by a little, for the small run that tells engines apart."""
+        """Move each joint by a little, for the run that compares engines."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 
     def progress(self, view: WritableView) -> JobState:

@@ -30,7 +30,7 @@ class JointVelocities(Struct, frozen=True):
     joints="joints",
 )
 class JointVelocityActuator(Actuator):
-    """Motors that keep the last speeds that they were told."""
+    """Motors that keep the speeds of the last command."""
 
     def __init__(self, settings: JointVelocitySettings, at: Mounting) -> None:
         self._group = JointGroup(settings, at)
@@ -62,7 +62,7 @@ class JointVelocityActuator(Actuator):
         view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
 
     def excite(self, view: WritableView) -> None:
-        """Turn each joint a little, for the small run that tells engines apart."""
+        """Turn each joint a little, for the run that compares engines."""
         view.write(self._group.set_point, *[0.2] * self._group.set_point.size)
 
     def command(self, view: View) -> Motors:

@@ -32,7 +32,7 @@ class PanTiltAngles(Struct, frozen=True):
     jobs=True,
 )
 class PanTilt(Actuator):
-    """Keeps the last angles that it was told: a proportional loop, as that of `joint_position`."""
+    """Keeps the angles of the last command by a proportional loop, as `joint_position` does."""
 
     def __init__(self, settings: PanTiltSettings, at: Mounting) -> None:
         self.group, self._settings = pan_tilt_of(settings, at), settings
@@ -40,7 +40,7 @@ class PanTilt(Actuator):
 
     @staticmethod
     def check(settings: PanTiltSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for joints that are not two, do not turn, or do not hang on each other."""
+        """Raise IncompatibleComponent unless there are two joints that turn, one on the other."""
         pan_tilt_of(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -62,7 +62,7 @@ class PanTilt(Actuator):
         self._set(view, self.group.positions(view))
 
     def excite(self, view: WritableView) -> None:
-        """Turn a little, for the small run that tells engines apart."""
+        """Turn a little, for the run that compares engines."""
         self._set(view, [angle + 0.2 for angle in self.group.positions(view)])
 
     def progress(self, view: WritableView) -> JobState:

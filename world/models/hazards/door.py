@@ -1,4 +1,4 @@
-"""A door: a box that slides from a closed place to an open one as far as it is told, and stops at who is in the way."""
+"""A door: a box that slides between a closed and an open place to the share `open`, and stops at who is in the way."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _leaf(its: DoorObject, place: Sequence[float]) -> Leaf:
     settable={"open": OPEN},
 )
 class Door(Model):
-    """A door that slides open and shut, as far as it is told.
+    """A door that slides between shut and open, to the share `open`.
 
     `open` is the share of its way by which it is to be open, `opened` by which it is, `blocked` that something is in
     its way.

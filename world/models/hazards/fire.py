@@ -53,7 +53,7 @@ class FireObject(EntitySettings):
 @lru_cache(maxsize=64)
 def _cone(radius: float) -> Mesh:
     """Return a cone that is as high as its radius (m)."""
-    import numpy as np  # for those who make bodies
+    import numpy as np  # only where bodies are built
 
     from foosim.world.bodies.hull import convex_hull
 

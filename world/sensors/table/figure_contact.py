@@ -29,7 +29,7 @@ class FigureContactSettings(SensorSettings):
 
 
 class FigureTouches(Struct, frozen=True):
-    """The contacts of a rod in the last tick, at most two: the `count` of those that began, and of each its ball, its
+    """The contacts of a rod in the last tick, at most two: the `count` of new ones, and of each its ball, its
     figure, the substep in which it began, and the sum of the normal impulses, in the order in which they began.
 
     Balls are counted from 0 in the order of their names, figures from 0 in that of their y; -1 is no ball, and the

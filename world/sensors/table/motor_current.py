@@ -15,7 +15,7 @@ from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
 from foosim.world.parameters.rod_drives import ForceConstant, RodVoltageSettings, TorqueConstant
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
     import numpy as np
     from numpy.typing import NDArray
 
