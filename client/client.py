@@ -588,11 +588,12 @@ def connect(
     """Connect to a run as the declared client `name`.
 
     `address` is `run:newest` or `run:NAME` for a run of this user on this machine, else that of the vHub's radio plane,
-    `tcp/HOST:PORT`. `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
-    `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key. Raises BadValue for
-    an invalid name or address, CertificateError for a folder without valid certificates, NoRun without such a live run,
-    ConnectionFailed without an answer within `timeout_s` (wall time), NotAuthorised and ConnectionRefused,
-    with the reason, when the vHub rejects the client.
+    `tcp/HOST:PORT`. `world` refuses any other world than this one. With certificates the address is `tls/HOST:PORT`,
+    and `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key.
+
+    Raises BadValue for an invalid name or address, CertificateError for a folder without valid certificates, NoRun
+    without such a live run, ConnectionFailed without an answer within `timeout_s` (wall time), NotAuthorised and
+    ConnectionRefused, with the reason, when the vHub rejects the client.
     """
     if not is_name(name):
         raise BadValue("not a name for a client", name)
