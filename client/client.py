@@ -1,4 +1,4 @@
-"""The library for programs and people: connect to a run, read its robots, command them, send and receive packets.
+"""Library for programs and interactive use: connect to a run, read its robots, command them, send and receive packets.
 
     with connect("run:newest", "hand") as client:
         client.subscribe("red.attack", "encoder")
@@ -283,7 +283,7 @@ class Link:
 
 
 class Client:
-    """One connection to a run. Made by `connect`; use it in `with`. When a lockstep client goes, the run ends."""
+    """One connection to a run. Made by `connect`; use it in `with`. When a lockstep client leaves, the run ends."""
 
     def __init__(self, link: Link, deployment: Deployment) -> None:
         """`link` has been let in; the client closes it."""
@@ -351,9 +351,9 @@ class Client:
         return self._ticks(turns)
 
     def listen(self, subscriptions: Iterable[tuple[str, str]] = ()) -> None:
-        """Take part outside of lockstep, and receive these (endpoint, channel) beside those of `subscribe`.
+        """Take part outside of lockstep, and receive these (endpoint, channel) in addition to `subscribe`.
 
-        The vHub takes the client in at a tick soon after; what is sent before that is lost. Raises UnknownName and
+        The vHub admits the client at a tick soon after; packets sent before that are lost. Raises UnknownName and
         NotJoined.
         """
         for source, channel in subscriptions:
@@ -392,14 +392,14 @@ class Client:
         self._link.perform()
 
     def broadcast(self, channel: str, payload: bytes) -> None:
-        """Send opaque bytes to all who have subscribed to this client's channel; otherwise as `send`.
+        """Send opaque bytes to all subscribers of this client's channel; otherwise as `send`.
 
         Each of them is one packet on a link of its own: some may get it, others not.
         """
         self.send("", channel, payload)
 
     def receive(self, timeout_s: float = 1.0) -> list[Arrived]:
-        """After `listen`: return what has arrived, waiting for it up to `timeout_s` of wall time.
+        """After `listen`: return the arrived packets, after at most `timeout_s` of wall time.
 
         The list is empty when nothing has. Sensors have their new samples with it. Raises RunEnded once the run is over
         and all has been taken, NotJoined and ConnectionFailed.
@@ -489,7 +489,7 @@ class Client:
         return [Packet(robot, channel, payload) for robot, channel, payload in due if payload is not None]
 
     def _send_jobs(self) -> None:
-        """After `listen`: send what is due of jobs; in lockstep that is sent with the tick."""
+        """After `listen`: send the due commands of jobs; in lockstep they are sent with the tick."""
         if self._period == 0 and not self._core.ended:
             for packet in self._due_jobs():
                 self.send(*packet)

@@ -52,7 +52,7 @@ class Taker(NamedTuple):
         codec = self.codec
         if not isinstance(command, codec.kind):
             if isinstance(command, Struct):
-                raise self.wrong(f"a {type(command).__name__} is none of these")
+                raise self.wrong(f"a {type(command).__name__} is not one of these")
             values = self._named(command) if isinstance(command, Mapping) else self._ordered(command)
             command = codec.kind(**values)
         if self.joints:

@@ -125,7 +125,7 @@ class Control:
     ) -> dict[str, bytes]:
         """Return the files that a deployment (read from the text that `describe` gives) refers to, by path.
 
-        Raises NoAnswer when `timeout_s` goes by without a piece of one.
+        Raises NoAnswer after `timeout_s` without a piece of a file.
         """
         fetching = Fetching(deployment, {})
         while (lacking := fetching.lacking) is not None:

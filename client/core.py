@@ -175,7 +175,7 @@ class ClientCore:
         if self.is_away:
             return
         self.is_away = True
-        self._lost_ns = now_ns + self._patience_ns(self.deployment)
+        self._lost_ns = now_ns + self._outage_ns_max(self.deployment)
         self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
         self.actions.append(Log("warning", "the vHub is gone; waits for it to come back"))
@@ -188,9 +188,9 @@ class ClientCore:
     def rest(self, stood_ns: int, now_ns: int) -> None:
         """Exclude a standstill of the client's own loop from the vHub's deadline (`runtime.standstill`)."""
         if self._lost_ns != NEVER_NS and self.deployment is not None:
-            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self._patience_ns(self.deployment))
+            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self._outage_ns_max(self.deployment))
 
-    def _patience_ns(self, deployment: Deployment) -> int:
+    def _outage_ns_max(self, deployment: Deployment) -> int:
         """How long to wait for a lost vHub. Before its first message this is the time for a start."""
         deadlines = deployment.deadlines
         has_begun = self._answered or self._received

@@ -1,4 +1,4 @@
-"""Jobs of an actuator, as who commands it sees them: commands with numbers, and how they stand by the job sensor.
+"""Jobs of an actuator on the side of the commander: commands with numbers, and their states by the job sensor.
 
 It sends and receives nothing itself: players, simulations and the client library hand it samples, and send the commands
 that are due. A player:
@@ -38,7 +38,7 @@ ENDS: Final[dict[JobState, type[JobError]]] = {
 class Job:
     """One job: `number` is None as long as it has not been sent, `state` NONE as long as it is not known to be taken.
 
-    `by` is who commanded the robot after it, where that is known of a job that was preempted; `why` is a sentence on
+    `by` is the next commander, where known, of a preempted job; `why` is a sentence on
     why it has failed, where the actuator gives a reason.
     """
 
@@ -152,7 +152,7 @@ class Jobs:
         at = 0 if self._reading is None else int(self._reading.running)
         return self.senders[at - 1] if at else ""
 
-    # --- what is heard and sent --------------------------------------------------------------------------------------
+    # --- packets ----------------------------------------------------------------------------------------------------
 
     def hear(self, samples: Samples) -> None:
         """Take the newest sample of the job sensor."""
@@ -205,11 +205,11 @@ class Jobs:
         return msgspec.structs.replace(command, **{JOB: float(number)})
 
     def commands(self, tick: int) -> Commands:
-        """Return what is `due` as a player returns it, and `Simulation.step` takes it."""
+        """Return the `due` command as a player returns it, and `Simulation.step` takes it."""
         command = self.due(tick)
         return {} if command is None else {self.robot: {self.actuator: command}}
 
     def payload(self, tick: int) -> bytes | None:
-        """Return what is `due` as the payload of a packet to the actuator's channel."""
+        """Return the `due` command as the payload of a packet to the actuator's channel."""
         command = self.due(tick)
         return None if command is None else self._taker.encode(command)

@@ -57,7 +57,7 @@ class Newest:
 
 
 class Acting:
-    """The player that a deployment declares under a name, made, and what it has heard: `act` is one turn of it."""
+    """An instance of a declared player and its received samples: `act` is one turn of it."""
 
     def __init__(
         self, deployment: Deployment, name: str, load: Callable[[str], PlayerFactory] = load_player, tick: int = -1
@@ -83,7 +83,7 @@ class Acting:
     def exist(self, since: int, absent: Collection[str], tick: int) -> None:
         """Be the player that exists since a tick, before it acts at another one; these of its robots are `absent`.
 
-        It is made anew, and has heard nothing, where the one before has existed since another tick. Raises PlayerError.
+        It is created anew, without samples, where the one before has existed since another tick. Raises PlayerError.
         """
         wanted: tuple[int | str, ...] = (since, *absent)
         if wanted == self._known:

@@ -221,7 +221,7 @@ class Replay:
         return status
 
     def learn(self, timeout_s: float) -> None:
-        """Request what is played, which is needed to decode payloads; `hear_replay` does."""
+        """Request the played deployment, which is needed to decode payloads; `hear_replay` does."""
         status = self.request("status", timeout_s)
         try:
             deployment, name = str(status["deployment"]), str(status["deployment_name"])

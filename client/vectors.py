@@ -35,7 +35,7 @@ NO_BOUNDS: Final[Mapping[str, Bounds]] = {}
 
 
 class Column(NamedTuple):
-    """One number of a vector: whose it is, its field and unit, and the least and the greatest value."""
+    """One number of a vector: its channel, field and unit, and the least and the greatest value."""
 
     robot: str
     channel: str

@@ -18,7 +18,7 @@ class Capture(reader.CaptureData):
         return capture_info(self.path)
 
     def verify(self, nodes: int = 1) -> Verified:
-        """Compute the world again on some nodes, and compare each tick: `equal` says the result.
+        """Compute the world again on some nodes, and compare each tick: `equal` is the result.
 
         Raises CaptureError for a capture that cannot be read or is a cut.
         """
@@ -26,6 +26,6 @@ class Capture(reader.CaptureData):
 
 
 def open_capture(path: Path | str) -> Capture:
-    """Open a capture, also an unfinished one. Raises CaptureError when it is none, or damaged."""
+    """Open a capture, also an unfinished one. Raises CaptureError for a file that is damaged or not a capture."""
     found = reader.open_capture(path)
     return Capture(**{field.name: getattr(found, field.name) for field in fields(found)})

@@ -215,7 +215,7 @@ def _bounce(tracks: Sequence[Array], field: Field) -> float | None:
 
 
 class _Problem:
-    """The residuals of all tracks and their derivatives, by the vector of what is fitted: surfaces, then starts.
+    """The residuals of all tracks and their derivatives, by the fitted vector: surfaces, then starts.
 
     `is_held`: surfaces are held to what the fit began with, by residuals of their own.
     """

@@ -36,7 +36,7 @@ WRITTEN: Final = {
     "bounce": ("walls", "restitution", 1.0, ""),
     "walls": ("walls", "friction", 1.0, ""),
 }
-"""Where what is fitted stands in `table.surfaces`, in which unit."""
+"""The places of fitted values in `table.surfaces`, and their units."""
 
 
 @app.command(name="fit")

@@ -158,7 +158,7 @@ class _Ball:
         return found
 
     def go(self, time: float, ax: float, ay: float) -> None:
-        """Go on for a time."""
+        """Continue for a time."""
         field, radius = self._field, self._field.radius
         self.x += self.vx * time + 0.5 * ax * time * time
         self.y += self.vy * time + 0.5 * ay * time * time

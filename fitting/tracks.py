@@ -27,7 +27,7 @@ QUANTITIES: Final = {"time": units.TIME, "x": units.LENGTH, "y": units.LENGTH}
 ALIASES: Final = {"t": "time"}
 LINES_MAX: Final = 1_000_000
 POINTS_MIN: Final = 20
-"""A track with fewer points says little more than where it began."""
+"""A track with fewer points determines little more than its start."""
 TRACKS_MAX: Final = 50
 POINTS_MAX: Final = 20_000
 """The fit's time grows with more than the square of the tracks: 8 s for 10, 43 s for 25, a minute and more beyond."""

@@ -28,10 +28,10 @@ PIXELS_MAX: Final = 8192
 BEYOND: Final = (24, 26, 30)
 """What is painted where nothing is: dark grey."""
 STANDING_M: Final = 0.05
-"""Scenery that is lower is ground: it does not say what is shown."""
+"""Lower scenery is ground: it does not widen the shown region."""
 MARGIN: Final = 1.02
 SIDE_M: Final = 10.0
-"""The side of what is shown of a world in which nothing stands."""
+"""The side of the shown region of an empty world."""
 
 
 class OverheadPainter:
@@ -40,7 +40,7 @@ class OverheadPainter:
     def __init__(
         self, scene: Scene, layout: Layout, pixels: tuple[int, int] = (320, 180), region: Region | None = None
     ) -> None:
-        """`pixels` are width and height. `region` is shown whole; by default, what stands in the world is.
+        """`pixels` are width and height. `region` is shown whole; by default it has all that stands in the world.
 
         Raises BadValue for invalid pixels or an invalid region.
         """

@@ -207,7 +207,7 @@ def _round_size(shape: Shape) -> tuple[float, float, float] | None:
 def covered_by_surface(shape: Shape, pose: Pose, view: View) -> Covered | None:
     """Return what a shape whose link is at this pose covers, with the height of its surface at each pixel.
 
-    None of what is round.
+    None for round shapes.
     """
     corners, triangles = _faces(shape)
     if not len(triangles):

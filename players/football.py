@@ -1,8 +1,8 @@
 """Players of the football table: a keeper, a striker, the team of both, and one that does nothing.
 
 They see packets only, noisy, late and some lost, and command rods by packets. Each is for either team (parameter
-`team`: red or blue), commands the rods that it hears, and judges the ball by its age: what is measured was so some
-milliseconds ago, and what is commanded happens some milliseconds later.
+`team`: red or blue), commands the rods that it hears, and accounts for latency: measurements are some
+milliseconds old, and commands take effect some milliseconds later.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Waiting(Protocol):
     """Where a rod waits for a ball that it does not strike now."""
 
     def y(self, rod: Rod, ball: View) -> float:
-        """Return where a figure shall stand."""
+        """Return the wanted place of a figure."""
 
 
 class Guarding:
@@ -103,7 +103,7 @@ class Playing:
         self._aim_key = draw_key(deployment.seed, "aim", team)
 
     def act(self, tick: int, samples: Samples) -> Commands:
-        """Return the command of each rod that was heard."""
+        """Return the command of each rod with a reading."""
         sight = self._senses.see(tick, samples)
         if sight is None:
             return {}

@@ -1,8 +1,8 @@
-"""Patrol: the on-board software of a rover that walks a hall with others, and shares what it knows by radio.
+"""Patrol: the on-board software of a rover that patrols a hall with others, and shares its knowledge by radio.
 
-It goes from spot to spot of the roadmap, always to the neighbouring one that was visited longest ago, by itself or by
-whom it hears (conscientious reactive patrolling with shared idleness: Machado, Ramalho, Zucker, Drogoul, MABS 2002). It
-keeps out of the spots that others are at or head for, and gives way to those with a smaller number. With little charge
+It moves from spot to spot of the roadmap, always to the neighbouring one with the oldest visit, by itself or by rovers
+in reach (conscientious reactive patrolling with shared idleness: Machado, Ramalho, Zucker, Drogoul, MABS 2002). It
+keeps out of the spots that others are at or head for, and gives way to rovers with a smaller number. With little charge
 it goes to the charger. Without a message for a while it slows down and relies on its proximity sensor alone.
 """
 
@@ -56,7 +56,7 @@ STUCK_S: Final = 4.0
 GIVEN_UP_S: Final = 10.0
 """for so long."""
 NEAR_M: Final = 1.2
-"""What is not on the map, and nearer than this where it is going, it turns away from,"""
+"""It turns away from things outside of the map that are nearer than this on its course,"""
 AVOIDED_S: Final = 3.0
 """and keeps to that for so long."""
 SIDE_RAD: Final = 1.2
@@ -296,7 +296,7 @@ class Patrol(Player):
         return max(free, key=lambda spot: (self._map.distance(spot, *seen), -spot), default=self._here)
 
     def _next(self, now_s: float) -> int:
-        """Return the spot to go to from here; here, when there is none that is free."""
+        """Return the spot to go to from here; this one if no other is free."""
         here, claimed = self._here, self._claimed(now_s)
         if self.charging:
             if here in self._chargers:

@@ -1,7 +1,7 @@
 """The foreman of a workshop: a porter carries crates to a crane, which hands them over to another one; then all back.
 
 The foreman has a list of steps, each of one aim or several, and takes the next step when all are reached by the samples
-that it hears. Grippers get jobs, joints and wheels get set-points at each turn: what the network loses is repeated. A
+that it hears. Grippers get jobs, joints and wheels get set-points at each turn: lost commands are repeated. A
 crate that was put elsewhere it tries to take again and again.
 """
 

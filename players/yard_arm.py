@@ -26,7 +26,7 @@ ASIDE_RAD: Final = 1.5
 NEAR_M: Final = 2.0
 """A scout is in the way of the arm if it is nearer than this to its foot."""
 SILENT_S: Final = 1.5
-"""A scout that was not heard for so long may be anywhere."""
+"""After this time without a report a scout may be anywhere."""
 THERE_RAD: Final = 0.05
 STAY_S: Final = 1.0
 """How long it stays over a lane."""

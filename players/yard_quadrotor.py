@@ -1,4 +1,4 @@
-"""The controller of a quadrotor that watches a yard: it takes off, circles, and passes on by radio what scouts say.
+"""The controller of a quadrotor that watches a yard: it takes off, circles, and forwards the scouts' reports by radio.
 
 From above it has a line of sight to both sides of a wall, so that a scout hears of another one behind it.
 """
@@ -83,7 +83,7 @@ class Watch(Player):
         self._watch_s = 0.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
-        """Fly on, and pass on what was heard."""
+        """Continue the flight, and forward reports."""
         now_s, name = tick * self._tick_s, self.settings.quadrotor
         self._sense(samples)
         self.heard.take(samples)

@@ -155,7 +155,7 @@ class Scout(Player):
         self._report_s = 0.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
-        """Drive, and say where it is five times a second."""
+        """Drive, and report its place five times a second."""
         now_s, robot = tick * self._tick_s, self.settings.scout
         travel, pose = samples.get((robot, "odometry")), samples.get((robot, "pose"))
         if travel is not None and isinstance(travel.value, WheelTravel):
@@ -285,7 +285,7 @@ class Scout(Player):
     # --- what it sees ------------------------------------------------------------------------------------------------
 
     def _ahead(self, distances: tuple[float, ...]) -> float:
-        """Return how far it is ahead of the scanner to what is next (m)."""
+        """Return the distance ahead of the scanner to the next thing (m)."""
         near = [way for way, bearing in zip(distances, self._bearings, strict=False) if abs(bearing) < GUARD_RAD]
         return min(near, default=self._range)
 

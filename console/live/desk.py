@@ -1,4 +1,4 @@
-"""What the console, as a client of the run, has robots do: jobs that operators give by the page, and how they stand.
+"""Jobs of the console as a client of the run: operators give them by the page, which shows their states.
 
 It is used by one thread (`sending.py`), and knows neither browsers nor how the client has connected.
 """
@@ -25,7 +25,7 @@ WORDS: Final[Mapping[JobState, str]] = {
     JobState.PREEMPTED: "preempted",
     JobState.CANCELLED: "cancelled",
 }
-UNSENT: Final = "not sent: the robot's job sensor has not been heard"
+UNSENT: Final = "not sent: the robot's job sensor has not been received"
 
 
 class Desk:
@@ -68,12 +68,12 @@ class Desk:
         return f"{robot}/{actuator}: {what}"
 
     def cancel(self, robot: str, actuator: str) -> str:
-        """Call the last job off; return what that is in words. Raises as `send`, BadValue where there is none."""
+        """Cancel the last job; return the request in words. Raises as `send`, BadValue without a job."""
         job = self._job(self._found(robot, actuator))
         if job is None or job.state.has_ended:
             raise BadValue(f"{robot}/{actuator}: no job of {self._client.name} to cancel")
         job.cancel()
-        return f"{robot}/{actuator}: job {job.number} is called off" if job.number else f"{robot}/{actuator}: not sent"
+        return f"{robot}/{actuator}: job {job.number} is cancelled" if job.number else f"{robot}/{actuator}: not sent"
 
     def turn(self) -> None:
         """Receive for a moment, and send what is due. Raises RunEnded, NotJoined and ConnectionFailed."""

@@ -25,10 +25,10 @@ FRAMES_BYTES: Final = 16 * 1024 * 1024
 STATUSES_BYTES: Final = 8 * 1024 * 1024
 LINKS_BYTES: Final = 8 * 1024 * 1024
 READINGS_MAX: Final = 64
-"""Channels of which readings are kept: the most recently received ones."""
+"""The count of channels with kept readings: the most recently received ones."""
 READINGS_BYTES: Final = 32 * 1024 * 1024 // READINGS_MAX
 ROW_BYTES: Final = 256
-"""Of a row beside its numbers."""
+"""Of a row in addition to its numbers."""
 
 Points = list[tuple[float, float]]
 Numbers = NDArray[np.floating[Any]]
@@ -110,7 +110,7 @@ class History:
         self._watched: Collection[Reading] = ()
 
     def listen(self, wanted: Wanted) -> None:
-        """Set what is received from now on: frames while a browser watches, readings that a browser plots."""
+        """Set the received data from now on: frames while a browser watches, readings that a browser plots."""
         if not (wanted.readers and wanted.hz):
             self._frames.interrupt()
         self._watched = wanted.readings  # readings of other viewers last as long as their lease

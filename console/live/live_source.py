@@ -1,8 +1,8 @@
 """A running system as a source: frames of the simulation plane's `view`, statuses, and requests of an operator.
 
-Looking on costs the run what its leases say: they are renewed only while a browser looks; while none does, a status is
-requested each second. A supervisor that dies is looked for again under the run's name, and what was seen stays in sight
-meanwhile; pages get the reason of the end of a run. Requests wait in threads, one connection each, so that none
+Leases bound the cost of viewers for the run: they are renewed only while a browser looks; otherwise a status is
+requested each second. After a loss of the supervisor it is sought under the run's name, and the last view stays
+visible; pages get the reason of the end of a run. Requests wait in threads, one connection each, so that none
 waits for another's answer.
 """
 

@@ -21,7 +21,7 @@ from foosim.world.forms.payloads import PayloadCodec
 
 
 def status_at(recording: Recording, account: Mapping[str, Any], tick: int, look: Look | None) -> dict[str, Any]:
-    """Return the status at a tick, of which `look` is what is shown; `account` is the state of the clock."""
+    """Return the status at a tick with the view `look`; `account` is the state of the clock."""
     about, deployment = recording.about, recording.deployment
     first, last = recording.span
     epoch = recording.epoch_at(tick)

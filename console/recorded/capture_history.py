@@ -1,7 +1,7 @@
 """What happened in a capture, read in slices so that others get their turn: marks, and each link's windows.
 
 The rows are read topic by topic, the few ones first; of a capture that grows, from where the last pass ended. All of it
-belongs to one thread, and so does the `Recording` that it reads. Pure: the caller says how much a slice is.
+belongs to one thread, and so does the `Recording` that it reads. Pure: the caller sets the size of a slice.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SLICE_ROWS: Final = 500
 EXPLAINED_MAX: Final = 1024
 """Drops whose explanations are kept."""
 PACKETS_MAX: Final = 10_000_000
-"""Packets whose times are kept: some hundred MB. Later ones are in no window, which a note reports."""
+"""Packets with kept times: some hundred MB. Windows lack later ones, which a note reports."""
 
 
 class CaptureHistory:

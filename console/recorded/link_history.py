@@ -95,7 +95,7 @@ class LinkHistory:
         self._links: dict[LinkKey, LinkRecord] = {}
 
     def add(self, mark: PacketMark, number: int) -> int:
-        """Count a packet, whose row has this number; return when it was dropped (ns), -1 when it was not."""
+        """Count a packet by the number of its row; return the time of its drop (ns), -1 for a delivered one."""
         key = mark.source, mark.destination, link_name(mark.rule, mark.radio)
         record = self._links.get(key)
         if record is None:

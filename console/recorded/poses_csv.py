@@ -44,7 +44,7 @@ NS_MAX: Final = 2**62
 
 
 class BadPoses(Refused):
-    """A table of poses that cannot be read: file, line, what is wrong and what is valid."""
+    """An unreadable table of poses: file, line, the problem and valid content."""
 
     exit_code = 2
 

@@ -90,7 +90,7 @@ class PosesSource:
         self.clock.changed()
 
     def where(self, time_ns: int) -> dict[str, Pose]:
-        """Return what is known at a time of the clock, by name."""
+        """Return the known poses at a time of the clock, by name."""
         found = {name: track.at(time_ns + self.offset_ns) for name, track in self.tracks.items()}
         return {name: pose for name, pose in found.items() if pose is not None}
 

@@ -1,7 +1,7 @@
 """Random access to a capture's world: its state at any tick, as exactly as the capture has it.
 
 At a tick there may be a captured frame, which is the world to the last bit, or captured poses alone; else what was
-captured last before it holds. `Look.kind` says which.
+captured last before it holds. `Look.kind` is which.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class Recording:
     # --- the world at a tick -----------------------------------------------------------------------------------------
 
     def look(self, tick: int) -> Look | None:
-        """Return what is seen at a tick, None while there is nothing. Raises CaptureError for what is damaged."""
+        """Return the view at a tick, None while the capture is empty. Raises CaptureError for damaged records."""
         time_ns = tick * self.tick_ns
         frame = self.frame(self.index.places[FRAME].newest(time_ns))
         number = self.index.places[POSES].newest(time_ns)
@@ -126,7 +126,7 @@ class Recording:
         return Look(tick, posed, "poses" if posed == tick else "held", self._poses(number), frame, values)
 
     def seen(self, tick: int, frame: Frame, kind: Kind) -> Look:
-        """Return what is seen of a frame."""
+        """Return the view of a frame."""
         return Look(tick, frame.tick, kind, self.drawing.poser.poses(frame.values), frame, self.shown(frame))
 
     def shown(self, frame: Frame) -> NDArray[np.float64]:
@@ -148,7 +148,7 @@ class Recording:
         return self.frame(self.index.places[FRAME].newest(tick * self.tick_ns))
 
     def neighbour(self, tick: int, *, later: bool) -> int | None:
-        """Return the next tick after, or before, one with a captured frame or poses; None where there is none."""
+        """Return the next tick after or before one with a captured frame or poses; None beyond the last."""
         found = []
         for topic in (FRAME, POSES):
             places = self.index.places[topic]

@@ -22,7 +22,7 @@ MARKS_MAX: Final = 4096
 WATCHED_MAX: Final = 64
 """Links, and readings, that all browsers together have looked at."""
 KEPT: Final = frozenset({"status", "links", "compared", "overlay", "presence", "jobs"})
-"""Messages of which the last one is kept for browsers that join, and of which only the newest waits."""
+"""Types of messages of which the last one is kept for new browsers, and only the newest waits."""
 PLOTTED: Final = frozenset({"status", "links", "readings"})
 
 

@@ -83,7 +83,7 @@ class Plot(_Message, frozen=True, tag="plot"):
     source: Place = 0
     series: Annotated[list[Series], Meta(max_length=CURVES_MAX)] = []
     generation: Number | None = None
-    """Of the scene whose fields are meant: of another one than the newest none are sent."""
+    """The generation of the fields' scene: fields of an older scene are ignored."""
 
 
 Message = Hello | PageRequest | Show | Watch | Plot

@@ -48,7 +48,7 @@ def _points(curve: Curve, message: Mapping[str, Any]) -> list[tuple[float, float
 
 
 def value_at(content: Any, path: str) -> float | None:
-    """Return the number at a path of keys joined by dots; None where there is none."""
+    """Return the number at a path of keys joined by dots; None for an unknown path."""
     for key in path.split("."):
         if isinstance(content, Mapping):
             content = content.get(key)

@@ -43,7 +43,7 @@ class Poser:
         self._jointed: list[tuple[int, Body, Entity]] = []
         leaving = [entity for entity in layout.entities if entity.can_leave]
         self._flags = np.array([entity.offsets[ABSENT] for entity in leaving], np.intp)
-        """The slots that say who is absent."""
+        """The slots that flag absent entities."""
         self._numbers = [slice(entity.start, entity.stop) for entity in leaving]
         places: dict[str, slice] = {}
         rows, slots = [], []
@@ -122,7 +122,7 @@ class Drawing:
         self._overlays: Overlays | None = None
 
     def known(self, poses: Mapping[str, Pose]) -> NDArray[np.float32]:
-        """Return poses of links by name, in the order of the scene; not a number where there is none."""
+        """Return poses of links by name, in the order of the scene; NaN for links without one."""
         rows = np.full((len(self.links), 7), np.nan, np.float32)
         for link, (position, orientation) in poses.items():
             place = self.links.get(link)

@@ -51,7 +51,7 @@ _NOTHING: Final = Count(0, 0, 0, 0, {})
 
 
 class Windows:
-    """Counts of the last seconds, and what they say of these seconds."""
+    """Counts of the last seconds, and the figures of these seconds."""
 
     def __init__(self, window_s: float = WINDOW_S) -> None:
         self._window_s = window_s

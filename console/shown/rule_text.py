@@ -1,4 +1,4 @@
-"""The rule of a link as people read it: its packets, its settings, its radio, its changes by events of the network at a
+"""The rule of a link in words: its packets, its settings, its radio, its changes by events of the network at a
 time, and what that amounts to.
 """
 
@@ -109,7 +109,7 @@ def _lines(
     if rule is not None:
         yield f"rule {rule.id}, {rule_ends(rule)}: {impairments_text(rule) or 'no settings of its own'}"
     elif profile.rule == ON_BOARD:
-        yield "no rule: a link between a robot and what is on it is perfect"
+        yield "no rule: a link between a robot and its own parts is perfect"
     elif profile.rule == IDEAL:
         yield "no rule names the console: its links are perfect"
     else:

@@ -41,7 +41,7 @@ class About:
     verbs: tuple[str, ...]
     """The verbs of an operator."""
     span: tuple[int, int] | None = None
-    """First and last tick of what has an end."""
+    """First and last tick of a source with an end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Moment:
     """Of each link of the scene, in its order, shape (links, 7): x, y, z in m, quaternion x, y, z, w; world frame. Not
     a number where it is absent, or where its pose is not known."""
     values: NDArray[np.float64]
-    """The frame's numbers, which the scene's `fields` index; not a number for what is absent, empty without a frame."""
+    """The frame's numbers, which the scene's `fields` index; NaN for absent entities, empty without a frame."""
     jump: bool = False
     """Not the moment after the one before: paths are cut here."""
     paused: bool = False

@@ -124,7 +124,7 @@ class Timeline:
             return "an event of the network that cannot be read"
 
     def take_epoch(self, epoch: EpochRow) -> None:
-        """Take the next epoch: who came or is gone, and which robots were moved."""
+        """Take the next epoch: the nodes that joined or left, and the moved robots."""
         before, self._epoch = self._epoch, epoch
         if before is None:
             return
@@ -204,7 +204,7 @@ def _vector(numbers: Sequence[float]) -> str:
 def moves(epochs: Sequence[EpochRow]) -> Iterator[tuple[int, str]]:
     """Yield (tick, text) of each robot that was moved from one node to another while both took part.
 
-    Recoveries report what another node adopts when its own is lost, and what goes back.
+    Recoveries report the robots that another node adopts at the loss of their own, and the ones that return.
     """
     for before, epoch in pairwise(epochs):
         owned = {owner.robot: owner.node for owner in before.owners}

@@ -29,7 +29,7 @@ NEAR_M: Final = 0.15
 
 
 PAST_M: Final = 0.005
-"""A ball that was seen no farther behind the front of the feet than this may have been stopped by them."""
+"""A ball seen at most this far behind the front of the feet may have been stopped by them."""
 LOW_RAD: Final = 0.5
 """Feet within this of straight down stop a ball."""
 FLIES_M: Final = 0.045

@@ -55,7 +55,7 @@ class GoTo(Actuator):
     """Keeps the place of the last command; without one the robot stands."""
 
     def __init__(self, settings: GoToSettings, at: Mounting) -> None:
-        """Raises BadValue where the robot's model does not say how it moves."""
+        """Raises BadValue for a model without wheels and without a way to move."""
         self._given, self._target = at.slot("given"), at.slot("target")
         self._position, self._heading = at.slot("position"), at.slot("heading")
         self._tolerance, self._progress = settings.tolerance, Progress(at, settings.patience_ns)
@@ -65,7 +65,7 @@ class GoTo(Actuator):
 
     @staticmethod
     def check(settings: GoToSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a robot that neither has wheels nor goes in any direction."""
+        """Raise IncompatibleComponent for a robot that neither has wheels nor moves in any direction."""
         is_base = isinstance(at.spec.robots[at.robot.name], HolonomicRobot)
         if not is_base and made_model(at.spec, at.layout, at.robot).wheels() is None:
             raise IncompatibleComponent(
@@ -117,7 +117,7 @@ class GoTo(Actuator):
 
 
 class _Base:
-    """The drive of a base that goes in any direction, and turns to where it goes."""
+    """The drive of a base that moves in any direction, and turns to its course."""
 
     def __init__(self, robot: HolonomicRobot) -> None:
         self.most = Steering(robot.speed, 0.0, robot.turn_rate)

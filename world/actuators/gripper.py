@@ -1,7 +1,7 @@
-"""A gripper: it takes an object that is near a place on a link, and holds it as it is.
+"""A gripper: it takes an object that is near a place on a link, and holds it in its pose.
 
-A grasp is a weld between the link and the object, of the engine. The frame has what is held and its pose in the frame
-of the link at the grasp; so each node that solves the two next holds them by the same.
+A grasp is a weld of the engine between the link and the object. The frame has the held object and its pose in the
+frame of the link at the grasp; so each node that solves the two next has the same weld.
 """
 
 from __future__ import annotations
@@ -98,10 +98,10 @@ class Gripper(Actuator):
         self._held, self._grasp = at.slot("held"), at.slot("grasp")
         self._wanted, self._failure = at.slot("wanted"), at.slot(FAILURE)
         self._quarantined = at.slot("quarantined")
-        self._objects = [(one, self._misfit(one)) for one in portables_of(at.spec, at.layout)]
+        self._objects = [(one, self._mismatch(one)) for one in portables_of(at.spec, at.layout)]
         """Each with the reason why it can never be taken."""
 
-    def _misfit(self, one: Portable) -> GraspFailure:
+    def _mismatch(self, one: Portable) -> GraspFailure:
         settings = self._settings
         if settings.tag is not None and settings.tag not in one.tags:
             return GraspFailure.NO_TAG
@@ -153,13 +153,13 @@ class Gripper(Actuator):
         _, position, orientation = forward_kinematics(self._body, self._robot, start)[self._link]
         point = moved(position, rotate(orientation, settings.at.position), 1.0)
         near = []
-        for one, misfit in self._objects:
+        for one, mismatch in self._objects:
             if one.entity.is_absent(start):
                 continue
             way = distance_from(one, start, point, settings.reach)
             if way is not None:
                 is_quarantined = start[one.entity.offsets["quarantined"]] > 0.0
-                failure = misfit or (GraspFailure.QUARANTINED if is_quarantined else GraspFailure.NONE)
+                failure = mismatch or (GraspFailure.QUARANTINED if is_quarantined else GraspFailure.NONE)
                 near.append((failure != GraspFailure.NONE, way, one.entity.name, failure, one.entity))
         if not near:
             return GraspFailure.OUT_OF_REACH
@@ -171,7 +171,7 @@ class Gripper(Actuator):
         return failure
 
     def hold(self, view: WritableView) -> None:
-        """Leave all as it is: what is held is held without power, too."""
+        """Leave all as it is: a gripper holds without power, too."""
 
     def excite(self, view: WritableView) -> None:
         """Close, for the run that compares engines."""

@@ -40,7 +40,7 @@ class MotionActuator(Actuator):
     """The two wheels of a robot, as one motion."""
 
     def __init__(self, settings: VWSettings, at: Mounting) -> None:
-        """Raises BadValue where the robot's model does not say what its wheels are."""
+        """Raises BadValue for a model without wheels."""
         self._wheels = wheels_of(at.spec, at.layout, at.robot)
         self._set_point = at.slot("set_point")
         self._at, self._half_track = self._set_point.at, self._wheels.track / 2.0

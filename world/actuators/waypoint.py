@@ -83,7 +83,7 @@ class WaypointActuator(Actuator):
         self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)
 
     def progress(self, view: WritableView) -> JobState:
-        """Return whether it hovers at its waypoint; what is left is m and rad together, for it may only turn."""
+        """Return whether it hovers at its waypoint, by the way that is left (m and rad together)."""
         left = [there - now for there, now in zip(view.read(self._target), self._pose(view), strict=True)]
         x, y, z, yaw = left
         way = sqrt(x * x + y * y + z * z) + abs(shorter(yaw))

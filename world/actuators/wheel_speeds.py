@@ -35,7 +35,7 @@ class DriveActuator(Actuator):
     """The two wheels of a robot."""
 
     def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
-        """Raises BadValue where the robot's model does not say what its wheels are."""
+        """Raises BadValue for a model without wheels."""
         self._wheels = wheels_of(at.spec, at.layout, at.robot)
         self._set_point, self._speed = at.slot("set_point"), self._wheels.speed
 

@@ -1,4 +1,4 @@
-"""A base that goes in any direction, by its velocity in its own frame and how fast it turns."""
+"""Velocity of a base that moves in any direction: in its own frame, and about its axis."""
 
 from __future__ import annotations
 

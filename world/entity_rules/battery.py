@@ -2,7 +2,7 @@
 
 In a tick of dt the charge falls by idle power x dt + drag x way, and rises by power x dt for each charger within whose
 radius the robot is, between 0 and the capacity. The way of a rover is that of its wheels, of any other robot the
-distance between its places at the tick's start and end; a robot with a fixed base goes no way.
+distance between its places at the tick's start and end; a robot with a fixed base covers none.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Battery(EntityRule):
         check_battery(settings, at)
 
     def place(self, view: WritableView) -> None:
-        """Charge it as the deployment says; a rover says it itself."""
+        """Charge it by the deployment's or the rover's own setting."""
         if not self._is_rover:
             view.write(self._charge, self._start)
 
@@ -102,7 +102,7 @@ class Battery(EntityRule):
         return place[0], place[1]
 
     def _places(self, view: View) -> Iterator[tuple[float, float, float, float]]:
-        """Yield where those are who charge, at the tick's start."""
+        """Yield the places of chargers at the tick's start."""
         for entity, reach, power in self._tagged:
             place = self._around.position(view, entity)
             if place is not None:

@@ -1,4 +1,4 @@
-"""A round base that goes in any direction, as on omnidirectional wheels, moved by kinematics."""
+"""A round base that moves in any direction, as on omnidirectional wheels, moved by kinematics."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ TEAL: Final[Colour] = (0.10, 0.55, 0.55, 1.0)
 
 
 class HolonomicRobot(Vehicle):
-    """A round base that goes in any direction. Its usual actuator is `motion`, of the kind `x_y_w`.
+    """A round base that moves in any direction. Its usual actuator is `motion`, of the kind `x_y_w`.
 
     `speed` and `acceleration` are the greatest in any direction, and `turn_rate` is how fast it turns at most; how fast
     it turns changes by at most `acceleration` over `radius`, so that the rim has no more. The sizes are those of usual
@@ -73,7 +73,7 @@ class HolonomicMotion(Motion):
     """In any direction, along arcs, as far as nothing is in the way.
 
     The velocity in the base's own frame approaches its set-point: the vector in the plane with at most one
-    acceleration, the turning with another. With it the base goes along an arc (`moving.arcs`), as far as nothing is in
+    acceleration, the turning with another. With it the base moves along an arc (`moving.arcs`), as far as nothing is in
     the way (`moving.free_way`); it turns where it is blocked.
     """
 
@@ -128,7 +128,7 @@ class HolonomicMotion(Motion):
     units={"heading": ("rad",), "base_velocity": ("m/s", "m/s", "rad/s")},
 )
 class Holonomic(Model):
-    """A round base that goes in any direction.
+    """A round base that moves in any direction.
 
     `base_velocity` is what its wheels do, ahead, to the left and turning left; `blocked` whether an obstacle stopped it
     in the tick.

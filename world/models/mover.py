@@ -78,7 +78,7 @@ PathPoints = Annotated[list[PathPoint], Field(min_length=2, max_length=POINTS_MA
 
 
 class MoverRobot(RobotSettings):
-    """A box, a cylinder or a sphere that goes along a path with the middle of its underside.
+    """A box, a cylinder or a sphere that moves along a path with the middle of its underside.
 
     A box has `length`, `width` and `height`, a cylinder `radius` and `height`, a sphere `radius`. The points of `path`
     have each a `time`, or the way between them is gone at `speed`. With `loop` it begins again: with times the last
@@ -109,15 +109,15 @@ class MoverRobot(RobotSettings):
                 yield f"a {self.shape} has {' and '.join(sizes)}: {key} {problem}"
         first, last = self.path[0], self.path[-1]
         if first.time_ns is None and self.speed is None:
-            yield "a path whose points have no times is gone at a speed, which is missing"
+            yield "a path without times needs a speed"
         if first.time_ns is not None and self.speed is not None:
-            yield "a path whose points have times has no speed besides"
+            yield "a path with times has no speed"
         if self.loop:
             is_closed = first.point.way_to(last.point) == 0.0
             if first.time_ns is not None and not is_closed:
-                yield "a loop whose points have times ends where it begins"
+                yield "a loop with times must end where it begins"
             if first.time_ns is None and is_closed:
-                yield "a loop at a speed goes back by itself: its last point is not the first one"
+                yield "a loop at a speed returns by itself: leave out the last point, which equals the first"
 
     def as_path(self) -> Path:
         """Return the path in time."""
@@ -148,7 +148,7 @@ class _Batch:
         self.movers = way.movers(entities)
         robots = [at.spec.robots[entity.name] for entity in entities]
         self.paths = [its.as_path() for its in robots if isinstance(its, MoverRobot)]
-        assert len(self.paths) == len(robots), "the motion track moves what has a path"
+        assert len(self.paths) == len(robots), "the motion track moves entities with a path"
 
 
 class Track(Motion):
@@ -202,7 +202,7 @@ class Track(Motion):
     units={"heading": ("rad",)},
 )
 class Mover(Model):
-    """A box, a cylinder or a sphere that goes along a path; `blocked` is whether an obstacle stopped it in the tick."""
+    """A box, a cylinder or a sphere that moves along a path; `blocked`: an obstacle stopped it in the tick."""
 
     def __init__(self, settings: MoverRobot, at: Mounting) -> None:
         self._settings, self._at = settings, at

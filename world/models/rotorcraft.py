@@ -89,7 +89,7 @@ class RotorcraftMotion(Motion):
     = m v dt - a dt^2 m (m - 1) / 2; the last one is no faster than a dt where m is the least whole number of at
     least (sqrt(1 + 8 d / (a dt^2)) - 1) / 2. So v = d / (m dt) + a dt (m - 1) / 2.
 
-    The velocity over the ground and that in height approach what is wanted by at most a dt each, where a is the
+    The velocity over the ground and that in height approach the wanted ones by at most a dt each, where a is the
     acceleration over the square root of 2: one is never kept from braking by the other. The heading turns the shorter
     way, at most so fast. A rotorcraft that is stopped by an obstacle (`moving.free_way`) has the velocity of the way
     that was left to it.
@@ -149,7 +149,7 @@ class RotorcraftMotion(Motion):
         return wanted
 
     def _fastest(self, way: Floats, most: Floats) -> Floats:
-        """Return the greatest speed from which who has this way to go still stops at its end."""
+        """Return the greatest speed that still allows a stop at the end of this way."""
         dt, brake = self._dt, self._batch.acceleration * EACH
         steps = np.maximum(np.ceil((np.sqrt(1.0 + 8.0 * way / (brake * dt * dt)) - 1.0) / 2.0), 1.0)
         found: Floats = np.minimum(way / (steps * dt) + brake * dt * (steps - 1.0) / 2.0, most)

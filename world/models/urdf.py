@@ -67,7 +67,7 @@ class UrdfRobot(RobotSettings):
 def robot_of(settings: UrdfRobot, spec: WorldSpec) -> Robot:
     """Return the robot in the file that settings name. Raises BadValue where that was not given."""
     if settings.file not in spec.asset_files:
-        raise BadValue("a URDF file whose content is not there", settings.file)
+        raise BadValue("the content of the URDF file is missing", settings.file)
     return read_urdf(settings.file, spec.asset_files)
 
 
@@ -99,7 +99,7 @@ class Urdf(Model):
         )
 
     def body(self) -> Body:
-        """Return links and shapes as the file says."""
+        """Return the links and shapes of the file."""
         return self._body
 
     def place(self, view: WritableView) -> None:

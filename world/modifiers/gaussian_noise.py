@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class GaussianNoiseSettings(ModifierSettings):
     """Adds a normal draw to each number: `std` is the standard deviation, of each field or of all.
 
-    What is at an end of its sensor's range stays: it says that nothing was measured. The result is within that range.
+    Values at an end of the sensor's range stay: they mean no measurement. The result is within that range.
     """
 
     std: PerField

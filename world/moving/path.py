@@ -26,7 +26,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """Points in the order of their times, at least two; all over again behind the last one where it is a loop."""
+    """Points in the order of their times, at least two; again from the first after the last one in a loop."""
 
     points: tuple[Point, ...]
     times: tuple[float, ...]

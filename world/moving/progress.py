@@ -1,4 +1,4 @@
-"""Whether something that goes somewhere comes nearer: jobs of going fail when it does not for too long."""
+"""Progress towards a place: a job fails after too long without any."""
 
 from __future__ import annotations
 

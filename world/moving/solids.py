@@ -95,7 +95,7 @@ def distance(along: Floats, across: Floats) -> Floats:
 
 
 def scenery_of(spec: WorldSpec) -> Iterator[Shape]:
-    """Yield the scenery of a world; meshes whose files were not given are left out."""
+    """Yield the scenery of a world; meshes without their files are left out."""
     yield from fixed_shapes(spec)
     for name, thing in sorted(spec.scenery.items()):
         mesh = spec.mesh_of(name)

@@ -76,7 +76,7 @@ class Feelers:
     """The two feelers of one robot: level fans of rays from the middle of its hull, from ahead to the left and to the
     right, as far as 120 degrees.
 
-    A ray goes as far as the feelers are long, and no farther aside than `ASIDE` times the hull's half width: what the
+    A ray is as long as the feelers, and reaches no farther aside than `ASIDE` times the hull's half width: what the
     robot would pass does not count. It meets something at a share of the way from the hull to its end.
     """
 
@@ -96,7 +96,7 @@ class Feelers:
         self._ahead = np.array([cos(turn) for turn in self._turns])
 
     def felt(self, view: View, heading: float, reach_m: float) -> Felt:
-        """Return what they meet at the start of the tick; what is farther away than `reach_m` does not count."""
+        """Return what they meet at the start of the tick within `reach_m`."""
         place, _ = self._mount.pose(view.start)
         ways = np.array([(cos(heading + turn), sin(heading + turn), 0.0) for turn in self._turns])
         reaches = np.minimum(self._reaches, reach_m)

@@ -90,7 +90,7 @@ def hall_of(spec: WorldSpec) -> Hall:
 
 
 def hall_findings(hall: Hall) -> Iterator[Finding]:
-    """Yield what is wrong between the settings of a hall."""
+    """Yield the contradictions between the settings of a hall."""
     rover = hall.rover
     if 2 * rover.radius > min(hall.length, hall.width):
         yield Finding((HALL, "rover", "radius"), "more than half of the hall's least side")

@@ -128,7 +128,7 @@ class RodSetPoint(Actuator):
         return True
 
     def hold(self, view: WritableView) -> None:
-        """Ask for nothing: a speed of 0, no force, or motors that are shorted, which brakes them."""
+        """Set all to 0: a speed of 0, no force, or shorted motors, which brake."""
         view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:

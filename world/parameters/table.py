@@ -161,7 +161,7 @@ FIGURES_MAX: Final = PRIMITIVES_MAX // 2
 
 
 class Line(SpecBase):
-    """One of a team's four lines: where its rod stands for red (blue's is mirrored) and what is on it."""
+    """One of a team's four lines: the place of its rod for red (blue's is mirrored) and its parts."""
 
     x: Position
     figures: Annotated[int, Field(ge=1, le=FIGURES_MAX)]
@@ -242,7 +242,7 @@ class Table(SpecBase):
     surfaces: Surfaces
     ball: Ball
     spare_balls: Annotated[int, Field(ge=0, le=63)] = 0
-    """Balls beside the first that a run can add."""
+    """Further balls that a run can add."""
     rod: Rod
     lines: dict[LineName, Line]
     drive: Drive

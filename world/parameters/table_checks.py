@@ -18,7 +18,7 @@ from foosim.world.spec import WorldSpec
 
 
 def table_findings(table: Table, spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what is wrong between the settings of a table, and of its robots."""
+    """Yield the contradictions between the settings of a table, and of its robots."""
     yield from _robots(table, spec)
     yield from _lines(table)
     yield from _neighbours(table)

@@ -35,10 +35,10 @@ HULL: Final = DEFAULT
 
 
 def leaning(at: At) -> BadValue | None:
-    """Return what is wrong with a place for what stands upright."""
+    """Return the problem of a place for an upright entity."""
     for key, angle in (("roll", at.roll), ("pitch", at.pitch)):
         if angle != 0.0:
-            return BadValue(f"what stands upright has no {key}", f"{angle:g} rad")
+            return BadValue(f"an upright entity has no {key}", f"{angle:g} rad")
     return None
 
 

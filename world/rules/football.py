@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 OF_BALL: Final = {"still_ticks": 1, "out_ticks": 1, "wait_ticks": 1, "spot": 2, "serve": 1, "touched_by": ENTITY}
 """Ticks that a ball has been at rest or off the table, and that it still has to wait for its kick-off; where that is
-(x, y) and towards which end (-1, 1, or 0 where a draw says it); and the rod that touched it last since then."""
+(x, y) and towards which end (-1, 1, or 0 for a draw); and the rod that touched it last since then."""
 OF_WORLD: Final = {"score": 2, "own_goals": 2, "kickoffs": 1, "played_ticks": 1, "is_over": 1, "over_since": 1}
 """Goals of red and blue, own goals of their figures, kick-offs; ticks with a ball in play; whether the match is over,
 and since which tick."""
@@ -230,7 +230,7 @@ class Football(Rule):
     # --- what happened -----------------------------------------------------------------------------------------------
 
     def marks(self, before: Frame, after: Frame) -> Iterator[Marked]:
-        """Yield goals, kick-offs and why balls came back, to the tick: what was counted says when it began."""
+        """Yield goals, kick-offs and why balls came back, to the tick, by the counted ticks."""
         wait = f"{self._name}.wait_ticks"
         returned: list[tuple[int, str]] = []
         kickoffs = 0
@@ -300,7 +300,7 @@ class _Ball:
         self._model = Ball(None, mounting_of(at.spec, at.layout, entity))
 
     def place(self, view: WritableView, position: Vector, velocity: Vector = ORIGIN) -> None:
-        """Set it to a place (m) with a velocity (m/s), and forget what was counted, and who touched it."""
+        """Set it to a place (m) with a velocity (m/s), and reset its counts and its last touch."""
         self._model.place_at(view, position, velocity)
         for slot in (self.still, self.out, self.wait):
             view.write(slot, 0.0)

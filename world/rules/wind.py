@@ -1,4 +1,4 @@
-"""Wind: the air that rigid bodies are in, and how fast it goes. What moves by kinematics does not feel it.
+"""Wind: the velocity of the air around rigid bodies. It does not act on bodies that move by kinematics.
 
 The engine `mujoco` computes what it does to a body, by MuJoCo's inertia box model of a passive medium (MuJoCo's
 documentation, Computation, section "Fluid forces"): the force along each axis of the box that has the body's mass and
@@ -30,7 +30,7 @@ Viscosity = Annotated[float, Quantity(units.VISCOSITY, "0 Pa s", "10 Pa s")]
 
 
 class WindSettings(RuleSettings):
-    """How fast the air goes in the world's frame, its density and its dynamic viscosity, by default those of air.
+    """The velocity of the air in the world's frame, its density and its dynamic viscosity, by default those of air.
 
     These are the values that MuJoCo's documentation names for air. `x`, `y` and `z` can be set during a run.
     """
@@ -61,7 +61,7 @@ def air_of(spec: WorldSpec, layout: Layout) -> Air | None:
 
 @rule("wind", WindSettings, slots=dict.fromkeys(AXES, 1), settable=dict.fromkeys(AXES, AIR_SPEED))
 class Wind(Rule):
-    """How fast the air goes (m/s), the same everywhere."""
+    """The velocity of the air (m/s), the same everywhere."""
 
     def __init__(self, settings: WindSettings, at: RuleMounting) -> None:
         self._start = {axis: getattr(settings, axis) for axis in AXES}

@@ -1,4 +1,4 @@
-"""A laser scanner: the distances to what stands in the way of beams that sweep a plane."""
+"""A laser scanner: the distances to the first thing on each beam in a plane."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "1 km")]
 
 
 class LaserScannerSettings(SensorSettings):
-    """How far it is from `at` to what stands in the way of each of `rays` beams, from `least` to `range`.
+    """The distance from `at` to the first thing on each of `rays` beams, from `least` to `range`.
 
     They are in the plane of x and y of the mount, over `angle` in equal steps: the first is farthest to the right of x,
     the last farthest to the left. Of a full turn the first is behind, and none is there twice; a single one is ahead.

@@ -39,7 +39,7 @@ class TrajectoryFailure(IntEnum):
 
 
 class JointTrajectorySettings(JointLoopSettings):
-    """Moves joints along points in time, of which a command has at most `points`.
+    """Moves joints along points in time, at most `points` for each command.
 
     Each joint moves at the speed of its way, and by `gain` times its distance from that. A job is done when the last
     time is over and each joint is within `tolerance` (m or rad) of its last position. It has failed `patience` later.
@@ -112,7 +112,7 @@ class JointTrajectory(Actuator):
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return no bounds: what is beyond those of a joint is refused."""
+        """Return no bounds: points beyond the limits of a joint are refused."""
         return {}
 
     def problem(self, command: Trajectory) -> str:
@@ -137,7 +137,7 @@ class JointTrajectory(Actuator):
         return TrajectoryFailure.NONE, ""
 
     def accept(self, command: Trajectory, view: WritableView) -> bool:
-        """Take points; False: they are none, or a joint cannot be as fast."""
+        """Take points; False if they are invalid or too fast for a joint."""
         failure, _ = self._refusal(command)
         start, times = self._group.positions(view), (0.0, *command.times)
         if failure == TrajectoryFailure.NONE:

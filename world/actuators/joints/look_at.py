@@ -96,7 +96,7 @@ class LookAt(Actuator):
         view.write(self._group.set_point, *[angle + 0.2 for angle in self._group.positions(view)])
 
     def progress(self, view: WritableView) -> JobState:
-        """Return whether it looks at the place; what is left is the way of both joints (rad), maybe the long one."""
+        """Return whether it looks at the place, by the way of both joints that is left (rad), maybe the long one."""
         _, ahead, way = self._sight(view)
         aside, angles = cross(ahead, way), self._group.positions(view)
         angle = atan2(sqrt(dot(aside, aside)), dot(ahead, way))

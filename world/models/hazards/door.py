@@ -1,4 +1,4 @@
-"""A door: a box that slides between a closed and an open place to the share `open`, and stops at who is in the way."""
+"""A door: a box that slides between a closed and an open place to the share `open`, and stops at obstacles."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class DoorObject(EntitySettings):
 
     @property
     def way(self) -> Vector:
-        """Which way it goes from closed to open (m)."""
+        """The way from closed to open (m)."""
         if self.lifts:
             return 0.0, 0.0, self.travel
         return self.travel * cos(self.closed.yaw), self.travel * sin(self.closed.yaw), 0.0

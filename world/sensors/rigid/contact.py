@@ -14,7 +14,7 @@ from foosim.world.forms.settings import SensorSettings
 
 
 class ContactSettings(SensorSettings):
-    """Measures touches at its rate, and besides at each tick at whose start a touch has begun in the tick before."""
+    """Measures touches at its rate, and also at each tick after one in which a touch has begun."""
 
 
 class Touches(Struct, frozen=True):

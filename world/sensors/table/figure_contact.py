@@ -25,7 +25,7 @@ Impulses = Annotated[tuple[NewtonSeconds, ...], Meta(min_length=TOUCHES_MAX, max
 
 
 class FigureContactSettings(SensorSettings):
-    """Tells of contacts at its rate, and besides at each tick at whose start one has begun in the tick before."""
+    """Reports contacts at its rate, and also at each tick after one in which a contact has begun."""
 
 
 class FigureTouches(Struct, frozen=True):

@@ -84,7 +84,7 @@ def _constants(settings: MotorCurrentSettings, at: Mounting) -> tuple[float, flo
     found = []
     for number, (key, own) in enumerate((("slide", settings.slide), ("spin", settings.spin))):
         if own is None and not motors:
-            what = f"nothing says how much a current moves: {key} is needed, or an actuator rod_voltage"
+            what = f"the force of a current is unknown: set {key}, or give an actuator rod_voltage"
             raise IncompatibleComponent(("kind",), what, settings.kind)
         found.append(motors[0][number] if own is None else own)
     return found[0], found[1]
