@@ -333,7 +333,7 @@ class Client:
         """
         check_subscription(self.deployment, source, channel)
         if self._period is not None and (source, channel) not in self._subscriptions:
-            raise NotJoined(f"subscribe to {source} {channel} before lockstep() or listen(): this client has joined")
+            raise NotJoined(f"subscribe to {source} {channel} before lockstep() or listen(): it has joined")
         self._subscriptions.add((source, channel))
 
     def lockstep(self, rate_hz: float | Fraction | None = None) -> Iterator[int]:

@@ -327,7 +327,7 @@ class ClientCore:
 
     def _is_for_me(self, message: ClientWelcome | ClientRefusal) -> bool:
         if message.name != self.name:
-            raise Malformed(f"a message on the key of {self.name} that names {message.name}")
+            raise Malformed(f"a message on the key of {self.name} names {message.name}")
         return message.boot == self.boot
 
     def _on_heard(self, heard: Heard) -> None:

@@ -90,10 +90,10 @@ class Jobs:
         kind = its.actuators[actuator].component_type
         self._failures: Mapping[float, str] = getattr(kind.factory, "FAILURES", {})
         if not kind.jobs:
-            raise BadValue(f"{self.what} does no jobs", its.actuators[actuator].kind)
+            raise BadValue(f"{self.what} has no jobs", its.actuators[actuator].kind)
         self.senders: Final = deployment.senders_to(robot)
         if sender not in self.senders:
-            raise UnknownName(f"{self.what} takes no jobs of it", sender, self.senders)
+            raise UnknownName(f"{self.what} takes no jobs from it", sender, self.senders)
         reporting = {
             channel for channel, one in its.sensors.items() if isinstance(one, JobSettings) and one.actuator == actuator
         }
@@ -103,7 +103,7 @@ class Jobs:
             heard = {channel for endpoint, channel in deployment.heard_by(sender) if endpoint == robot}
             if reporting.isdisjoint(heard):
                 raise BadValue(
-                    f"{sender} does not hear {' or '.join(sorted(reporting))} of {robot}, the sensor of", actuator
+                    f"{sender} does not hear {' or '.join(sorted(reporting))} of {robot}, the job sensor of", actuator
                 )
             reporting &= heard
         self.heard: Final = (robot, min(reporting))

@@ -127,13 +127,13 @@ class Acting:
         """Return the player's packets to others, and to its robots' channels."""
         deployment, declared = self._deployment, self.declared
         if not isinstance(packets, Sequence) or not all(isinstance(packet, Packet) for packet in packets):
-            raise PlayerError(f"{where}: a turn's packets are a {type(packets).__name__}, not a sequence of Packet")
+            raise PlayerError(f"{where}: packets is a {type(packets).__name__}; expected a sequence of Packet")
         for packet in packets:
             to = packet.destination
             if to in deployment.robots and to not in declared.robots:
                 raise PlayerError(f"{where}: {UnknownName('not one of its robots', to, declared.robots)}")
             if not isinstance(packet.payload, bytes):
-                raise PlayerError(f"{where}: a payload is a {type(packet.payload).__name__}, not bytes")
+                raise PlayerError(f"{where}: a payload is a {type(packet.payload).__name__}; expected bytes")
             try:
                 check_packet(deployment, packet)
             except (UnknownName, PacketError) as error:
@@ -145,7 +145,7 @@ class Acting:
         declared, encoder = self.declared, self._encoder
         if not isinstance(commands, Mapping):
             kind = type(commands).__name__
-            raise PlayerError(f"{where}: act gave a value of type {kind}, not a mapping from robots to commands")
+            raise PlayerError(f"{where}: act returned a {kind}; expected a mapping from robots to commands")
         packets = []
         for robot, command in sorted(commands.items(), key=_by_name):
             if robot not in declared.robots:

@@ -228,7 +228,7 @@ class Replay:
             self._old_names = {str(new): str(old) for old, new in status["names"].items()}
             self._old_channels = {str(new): str(old) for old, new in status["channels"].items()}
         except (KeyError, AttributeError) as error:
-            raise ReplayRefused(f"the replay's status does not have what it plays: {error}") from None
+            raise ReplayRefused(f"the replay's status lacks its deployment: {error}") from None
         self._deployment = load_deployment(deployment, name)
 
     def close(self) -> None:

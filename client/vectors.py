@@ -171,11 +171,11 @@ class CommandVector:
         non-finite number.
         """
         if vector.shape != (len(self.columns),):
-            raise BadValue(f"an action has {len(self.columns)} numbers, this one has the shape {vector.shape}")
+            raise BadValue(f"an action of shape {vector.shape}; expected ({len(self.columns)},)")
         numbers: list[float] = vector.tolist()
         if not all(map(isfinite, numbers)):
             number, column = next(pair for pair in zip(numbers, self.columns, strict=True) if not isfinite(pair[0]))
-            raise BadValue(f"{column.field} of {column.robot} is not finite", number)
+            raise BadValue(f"non-finite {column.field} of {column.robot}", number)
         clipped = [
             low if number < low else high if number > high else number
             for number, low, high in zip(numbers, self._lows, self._highs, strict=True)

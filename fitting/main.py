@@ -66,9 +66,9 @@ def fit_command(
     # Before scipy is imported. The matrices are small: threads would wait for each other longer than they compute.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if out is not None and out.exists():
-        raise BadValue(f"--out {out}: it exists, and is never overwritten")
+        raise BadValue(f"--out {out}: the file exists, and is never overwritten")
     if out is not None and not out.parent.is_dir():
-        raise BadValue(f"--out {out}: there is no folder {out.parent}")
+        raise BadValue(f"--out {out}: no folder {out.parent}")
     spec = load_deployment(apply_sets(read_source_file(table), str(table), sets or ()), str(table))
     if TABLE not in spec.kits:
         raise BadValue(f"--table {table}: a deployment without a table section")
@@ -150,7 +150,7 @@ def _unknown(found: Result) -> Iterator[str]:
 
 def _yaml(found: Result, tracks: list[Track]) -> Iterator[str]:
     yield f"# {found.points} points of {len(tracks)} tracks, {found.rebounds} rebounds; residuals of"
-    yield f"# {found.noise * 1e3:.2f} mm. Beside each value half of its interval of 95 % confidence."
+    yield f"# {found.noise * 1e3:.2f} mm. After each value half of its interval of 95 % confidence."
     known = {name: one for name, one in found.pairs.items() if one.is_known}
     if not known:
         yield "{}"

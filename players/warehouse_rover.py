@@ -98,9 +98,9 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     settings = Settings(**{"rover": "", **parameters})
     rovers = [name for name, robot in deployment.robots.items() if isinstance(robot, RoverRobot)]
     if settings.rover not in rovers:
-        raise UnknownName("parameter rover is no rover", settings.rover, rovers)
+        raise UnknownName("parameter rover is not a rover", settings.rover, rovers)
     if settings.base and settings.base not in deployment.players:
-        raise UnknownName("parameter base is no player", settings.base, deployment.players)
+        raise UnknownName("parameter base is not a player", settings.base, deployment.players)
     if len(rovers) > ROVERS_MAX:
         raise BadValue(f"a patrol has at most {ROVERS_MAX} rovers", len(rovers))
     if not settings.low < settings.high <= 1.0:

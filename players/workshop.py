@@ -167,7 +167,7 @@ class Plan:
         named: list[tuple[str, Mapping[str, Any]]] = [(name, arms) for name in self.robots]
         for name, known in (*named, *((name, boxes) for name in parameters["crates"])):
             if name not in known:
-                raise UnknownName("a parameter names what cannot be its porter, crane or crate", name, known)
+                raise UnknownName("a parameter names an unfit porter, crane or crate", name, known)
         porter, west, east = (arms[name].at for name in self.robots)
         self.hub: Final = porter.x, porter.y
         crates = [boxes[name] for name in parameters["crates"]]

@@ -39,14 +39,14 @@ class Arm(Player):
         name, scouts = parameters.get("arm"), parameters.get("scouts")
         robot = deployment.robots.get(name) if isinstance(name, str) else None
         if not isinstance(name, str) or not isinstance(robot, UrdfRobot):
-            raise BadValue("parameter arm is no robot from a URDF file", name)
+            raise BadValue("parameter arm is not a robot from a URDF file", name)
         self._name = name
         if not isinstance(scouts, list) or set(parameters) != {"arm", "scouts"}:
             raise BadValue("the parameters are arm, and the list scouts", sorted(parameters))
         robots = sorted(deployment.robots)
         for scout in scouts:
             if scout not in robots:
-                raise UnknownName("parameter scouts names no robot", scout, robots)
+                raise UnknownName("parameter scouts names an unknown robot", scout, robots)
         self._scouts = [robots.index(scout) for scout in scouts]
         self._x, self._y, _ = robot.at.position
         self._tick_s = deployment.tick_ns / 1e9

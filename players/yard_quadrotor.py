@@ -56,9 +56,9 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     settings = Settings(**{"quadrotor": "", **parameters})
     flyers = sorted(name for name, its in deployment.robots.items() if isinstance(its, QuadrotorRobot))
     if settings.quadrotor not in flyers:
-        raise UnknownName("parameter quadrotor is no quadrotor", settings.quadrotor, flyers)
+        raise UnknownName("parameter quadrotor is not a quadrotor", settings.quadrotor, flyers)
     if deployment.origin is None:
-        raise BadValue("a quadrotor that flies by satellites needs the deployment's origin on Earth")
+        raise BadValue("a quadrotor with satellite navigation needs the deployment's origin on Earth")
     return settings
 
 

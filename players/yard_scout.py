@@ -104,11 +104,11 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     scouts = sorted(name for name, its in deployment.robots.items() if isinstance(its, DifferentialDriveRobot))
     for name in (settings.scout, settings.partner):
         if name not in scouts:
-            raise UnknownName("parameter scout or partner is no differential drive", name, scouts)
+            raise UnknownName("parameter scout or partner is not a differential drive", name, scouts)
     boxes = sorted(name for name, its in deployment.objects.items() if isinstance(its, BoxObject))
     for name in settings.crates:
         if name not in boxes:
-            raise UnknownName("parameter crates names no box", name, boxes)
+            raise UnknownName("parameter crates names other than a box", name, boxes)
     if settings.crates and len(settings.crates) != len(settings.goals):
         raise BadValue("parameter goals has a number for each crate", len(settings.goals))
     return settings
@@ -135,7 +135,7 @@ class Scout(Player):
         self._tick_s = deployment.tick_ns / 1e9
         scanner = robot.sensors.get("scan")
         if not isinstance(scanner, LaserScannerSettings):
-            raise BadValue("a scout has a laser scanner named scan", settings.scout)
+            raise BadValue("a scout needs a laser scanner named scan", settings.scout)
         first, _ = scanner.bearings
         step = step_of(scanner.rays, scanner.angle)
         self._bearings = [first + ray * step for ray in range(scanner.rays)]

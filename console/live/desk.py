@@ -98,5 +98,5 @@ class Desk:
     def _found(self, robot: str, actuator: str) -> tuple[str, str]:
         if (robot, actuator) not in self._takers:
             valid = ["/".join(pair) for pair in self._takers]
-            raise UnknownName("no actuator whose jobs a sensor reports", f"{robot}/{actuator}", valid)
+            raise UnknownName("no actuator with a job sensor", f"{robot}/{actuator}", valid)
         return robot, actuator

@@ -90,7 +90,7 @@ class Following:
         world = World(deployment)
         if world.drawing.layout.digest.hex() != what["layout"]:
             raise Malformed(
-                f"run {what['run']} has another layout of its deployment: another version of foosim runs it"
+                f"run {what['run']} has another layout: another version of foosim runs it"
             )
         return world
 
@@ -114,7 +114,7 @@ class Following:
         if newest is not None and any(
             one.name == robot and one.is_absent(newest.numbers) for one in newest.layout.robots
         ):
-            raise BadValue("an absent robot does no jobs: add it first", robot)
+            raise BadValue("the robot is absent: add it first", robot)
 
     @property
     def _described(self) -> World:

@@ -105,7 +105,7 @@ class Sending:
             try:
                 self._client = self._join(deployment.console)
             except Refused as refused:
-                raise Failed(f"this console cannot send robots, it is not connected: {refused}") from None
+                raise Failed(f"this console cannot send robots, its client is not connected: {refused}") from None
             self._desk = Desk(self._client, deployment, self._drawing.layout)
         return self._desk
 

@@ -168,7 +168,7 @@ class Recording:
         for tick in range(after + 1, until + 1):
             number = places.newest(tick * self.tick_ns)
             if number < 0 or places.log_ns[number] != tick * self.tick_ns:
-                raise CaptureError(f"{self.path}: tick {tick} is not there")
+                raise CaptureError(f"{self.path}: tick {tick} is missing")
             yield captured_tick(self.row(TICK, number))
 
     def epoch_at(self, tick: int) -> EpochRow | None:

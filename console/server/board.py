@@ -131,7 +131,7 @@ class Board:
     def checked(self, source: int) -> int:
         """Return the number of a source, or raise `Malformed`."""
         if source >= len(self.sources):
-            raise Malformed(f"no source {source}: there are 0 to {len(self.sources) - 1}")
+            raise Malformed(f"no source {source}: valid are 0 to {len(self.sources) - 1}")
         return source
 
     def _welcome(self, reader: Reader, kind: str) -> bytes:

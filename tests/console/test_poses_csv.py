@@ -53,8 +53,8 @@ GOOD = "0,ball,0,0,0,0,0,1\n"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "poses.csv: it is empty, the first line names the columns"),
-        (HEAD, "poses.csv: no line after that of the columns"),
+        ("", "poses.csv: the file is empty; the first line names the columns"),
+        (HEAD, "poses.csv: no line after the header"),
         ("tme,entity,x,y\n", "poses.csv:1: no column for time (time, time_s, time_ms, time_us, time_ns) among "),
         ("time_s,time_ns,entity,x,y\n", "poses.csv:1: one column for time, not time_s and time_ns"),
         ("time,x,y\n", "poses.csv:1: no column for what moves (entity, link, name, body) among time, x, y"),
@@ -67,7 +67,7 @@ GOOD = "0,ball,0,0,0,0,0,1\n"
         (HEAD + "0.1,ball,1e9,0,0,0,0,1\n", "poses.csv:2: column 'x' is out of range (1e+06), '1e9'"),
         (HEAD + "1e30,ball,1,0,0,0,0,1\n", "poses.csv:2: column 'time_s' is out of range"),
         (HEAD + "0.1,,1,0,0,0,0,1\n", "poses.csv:2: column 'entity' is empty"),
-        (HEAD + "0.1,ball,1,0,0,0,0,0.5\n", "poses.csv:2: a quaternion of length 0.5, it has 1"),
+        (HEAD + "0.1,ball,1,0,0,0,0,0.5\n", "poses.csv:2: a quaternion of length 0.5; expected 1"),
         (HEAD + GOOD + GOOD, "poses.csv:3: ball at 0 s is not later than 0 s; times ascend"),
         (HEAD + '0,"ball,0,0,0,0,0,1\n', "poses.csv:2: not a line of a table"),
     ],

@@ -17,7 +17,7 @@ from tests.console.test_desk import ROBOTS, TEXT
 from tests.kinematic_yard import yard_text
 
 GO = {"robot": "scout", "actuator": "drive", "numbers": {"x": 1.0, "y": 0.0}}
-WHY = "this console cannot send robots, it is not connected: a client desk is already here"
+WHY = "this console cannot send robots, its client is not connected: a client desk is already here"
 
 
 async def refused(sending: Sending) -> None:

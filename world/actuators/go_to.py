@@ -69,7 +69,7 @@ class GoTo(Actuator):
         is_base = isinstance(at.spec.robots[at.robot.name], HolonomicRobot)
         if not is_base and made_model(at.spec, at.layout, at.robot).wheels() is None:
             raise IncompatibleComponent(
-                ("kind",), "it moves robots on two wheels, and those of the model holonomic", settings.kind
+                ("kind",), "valid are robots on two wheels and of the model holonomic", settings.kind
             )
 
     def limits(self) -> dict[str, tuple[float, float]]:

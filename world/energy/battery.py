@@ -39,7 +39,7 @@ class Charger(SpecBase):
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
         if (self.tag is None) is (self.x is None and self.y is None):
-            raise custom_error(BadValue("a charger is about x and y, or about a tag"))
+            raise custom_error(BadValue("a charger has x and y, or a tag"))
         return self
 
 
@@ -114,7 +114,7 @@ def check_battery(settings: BatteryRuleSettings, at: Mounting) -> None:
         valid = "its battery is that of hall.rover.battery, hall.station charges it"
         raise IncompatibleComponent((given[0],), f"not of a rover of the hall: {valid}", given[0])
     if not is_rover(at.spec, at.robot) and settings.capacity is None:
-        raise IncompatibleComponent(("kind",), "a battery without a capacity, such as capacity: 200 Wh", settings.kind)
+        raise IncompatibleComponent(("kind",), "a battery needs a capacity, for example 200 Wh", settings.kind)
     first, *more = batteries_of(at.spec, at.robot)
     if more and at.name != first:
-        raise IncompatibleComponent(("kind",), f"a second battery of a robot: it has {first}", settings.kind)
+        raise IncompatibleComponent(("kind",), f"a second battery: the first is {first}", settings.kind)

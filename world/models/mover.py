@@ -62,13 +62,13 @@ def _sensible(path: list[PathPoint]) -> list[PathPoint]:
     timed = [point.time_ns is not None for point in path]
     if any(timed) and not all(timed):
         number = timed.index(not timed[0]) + 1
-        raise custom_error(BadValue(f"all points of a path have a time or none has: point {number} differs"))
+        raise custom_error(BadValue(f"point {number} differs: give all points of a path a time, or none"))
     for number, (one, other) in enumerate(pairwise(path), 2):
         if one.time_ns is None or other.time_ns is None:
             if one.point.way_to(other.point) == 0.0:
-                raise custom_error(BadValue(f"point {number} is where the one before it is: without times it cannot"))
+                raise custom_error(BadValue(f"point {number} equals the one before it: the path needs times"))
         elif other.time_ns <= one.time_ns:
-            raise custom_error(BadValue(f"the time of point {number} is not after that of the one before it"))
+            raise custom_error(BadValue(f"the time of point {number} is not after the time of the point before it"))
         elif one.point.way_to(other.point) > FASTEST * (other.time_ns - one.time_ns) / 1e9:
             raise custom_error(BadValue(f"the way to point {number} is faster than {FASTEST:g} m/s"))
     return path

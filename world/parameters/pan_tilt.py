@@ -42,7 +42,7 @@ def pan_tilt_of(settings: PanTiltSettings, at: Mounting) -> JointGroup:
         raise IncompatibleComponent((path,), "two joints that turn are valid, pan and tilt", names)
     pan, tilt = (body.links.index(link) for link in group.links)
     if not hangs_on(body, tilt, pan):
-        raise IncompatibleComponent((path,), "the second one hangs on the first: pan, then tilt", names)
+        raise IncompatibleComponent((path,), "the second joint must be on the first: pan, then tilt", names)
     return group
 
 
