@@ -75,7 +75,7 @@ class _Table:
             missing = ", ".join(sorted({*QUATERNION} - {*self._turn}))
             raise BadPoses(f"{place}: an orientation needs {', '.join(QUATERNION)}; {missing} is missing")
         if len(self._turn) > 1 and self._turn[0] in YAWS:
-            raise BadPoses(f"{place}: two orientations; give one of {', '.join(self._turn)}")
+            raise BadPoses(f"{place}: several orientations; give one of {', '.join(self._turn)}")
 
     def _one(self, what: str, names: Iterable[str]) -> str:
         """Return the name of the one column of these names. Raises BadPoses."""

@@ -209,9 +209,9 @@ def test_without_a_rebound_nothing_is_said_of_walls(typed: Typed, tmp_path: Path
     (floor,) = yaml.safe_load(out.read_text())["table"]["surfaces"].items()
     assert floor[0] == "floor" and floor[1]["friction"] == pytest.approx(0.3, rel=0.05)
     again = run(typed, file, "--table", TABLE, "--out", out)
-    assert again.code == 2 and again.err == f"--out {out}: it exists, and is never overwritten\n"
+    assert again.code == 2 and again.err == f"--out {out}: the file exists, and is never overwritten\n"
     beside = run(typed, file, "--table", TABLE, "--out", tmp_path / "none" / "fitted.yaml")
-    assert beside.code == 2 and beside.err.endswith(f": there is no folder {tmp_path / 'none'}\n")
+    assert beside.code == 2 and beside.err.endswith(f": no folder {tmp_path / 'none'}\n")
 
 
 def test_scipy_is_asked_for(monkeypatch: pytest.MonkeyPatch, noisy: tuple[Table, list[Array]]) -> None:

@@ -56,7 +56,7 @@ CASES: Final[list[tuple[str, str, dict[str, Any], str]]] = [
         "workshop.yaml",
         "foreman",
         {"name": "nobody"},
-        "porter/gripper takes no jobs of it (there are: foreman), 'nobody'",
+        "porter/gripper takes no jobs from it (there are: foreman), 'nobody'",
     ),
     ("workshop.yaml", "foreman", {"speed": 1.0}, "the parameters are name, porter, two cranes, and crates, "),
 ]
