@@ -9,7 +9,7 @@
 
 The name is one that the deployment declares under `clients`. In `lockstep` the run waits at each of the client's ticks
 until the loop's body is done; after `listen` it continues by itself. Everything travels as packets through the emulated
-network: what arrives is late, and some is lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
+network: packets arrive late, and some are lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
 frame (origin on the floor in the middle, z up). A client belongs to one thread.
 """
 
@@ -78,7 +78,7 @@ class Arrived:
     source: str
     channel: str
     sequence: int
-    """Grows with each packet of its source; what the network delivers twice has it twice."""
+    """Grows with each packet of its source; a packet that the network delivers twice has it twice."""
     sent_ns: int
     due_ns: int
     payload: bytes
@@ -196,7 +196,7 @@ class Actuator:
 
 
 class Robot:
-    """One robot: what it measures and what moves it, by the names in the deployment."""
+    """One robot: its sensors and actuators, by the names in the deployment."""
 
     def __init__(self, client: Client, name: str) -> None:
         self.name: Final = name
@@ -308,7 +308,7 @@ class Client:
         self._jobs: dict[tuple[str, str], Jobs] = {}
         """By robot and channel of the actuator."""
 
-    # --- what it is --------------------------------------------------------------------------------------------------
+    # --- description -------------------------------------------------------------------------------------------------
 
     @property
     def tick(self) -> int:
@@ -464,7 +464,7 @@ class Client:
                     self._answer()
 
     def _answer(self) -> None:
-        """Send what was set in the loop's body, commands last and in their robots' name order."""
+        """Send the packets and commands of the loop's body, commands last and in their robots' name order."""
         packets = [*self._outgoing, *self._due_jobs(), *(command for _, command in sorted(self._commands.items()))]
         self._outgoing.clear()
         self._commands.clear()

@@ -171,7 +171,7 @@ def pki_of(info: RunInfo) -> Path | None:
 def request(verb: str, run: str | None = None, **arguments: Any) -> Answer:
     """Send a request to the newest live run, or to the one named, and return the answer; None arguments are left out.
 
-    Raises what `connect` and `Control.request` raise.
+    Raises the errors of `connect` and `Control.request`.
     """
     with connect(run) as control:
         return control.request(verb, **{name: value for name, value in arguments.items() if value is not None})

@@ -72,7 +72,7 @@ class ClientStatistics:
 
 
 class ClientCore:
-    """One client's state machine. `actions` are what the shell performs next."""
+    """One client's state machine. `actions` are the shell's next steps."""
 
     def __init__(self, name: str, boot: str, now_ns: int, world: str = "") -> None:
         """`world` is empty when the client accepts any world."""
@@ -125,7 +125,7 @@ class ClientCore:
             Heard: self._on_heard,
         }
 
-    # --- what the shell calls --------------------------------------------------------------------------------------
+    # --- calls of the shell ----------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
         """Handle one message; an invalid one is counted and dropped."""
@@ -201,7 +201,7 @@ class ClientCore:
         packets = self._received, self._sent, self._answered, self._unsent
         return ClientStatistics(*downlinks, *packets, self._returns)
 
-    # --- what the client does --------------------------------------------------------------------------------------
+    # --- calls of the client ---------------------------------------------------------------------------------------
 
     def join(
         self,

@@ -148,7 +148,7 @@ class Jobs:
 
     @property
     def running(self) -> str:
-        """Whose job the actuator does, by the newest reading; empty for none."""
+        """The sender of the running job, by the newest reading; empty for none."""
         at = 0 if self._reading is None else int(self._reading.running)
         return self.senders[at - 1] if at else ""
 
@@ -185,7 +185,7 @@ class Jobs:
         self._open = [job for job in self._open if not job.state.has_ended]
 
     def due(self, tick: int) -> Any | None:
-        """Return the command that is to be sent at a tick, with its job's number; None where there is nothing to send.
+        """Return the command to send at a tick, with its job's number; None for none.
 
         It is sent again until a reading reports it as taken. The first one waits for a reading, which has the
         number of the last job before a restart; and a number is above that of the tick, so that none is used twice.

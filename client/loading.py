@@ -109,7 +109,7 @@ def _unfit(made: Any, name: str) -> str:
 
 
 def _other_arguments(call: Callable[..., Any], *arguments: str) -> str:
-    """Return what something takes that cannot be called with these arguments; empty where it can, or may."""
+    """Return the parameters of a callable that these arguments do not fit; empty where they fit, or may."""
     try:
         signature = inspect.signature(call)
     except (ValueError, TypeError):  # of C code without a signature

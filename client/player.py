@@ -1,4 +1,4 @@
-"""Players: the base class of a controller, what it gets, and what it returns.
+"""Players: the base class of a controller, its inputs and its outputs.
 
 The deployment names a player's class as `module:Class`, with a rate, the robots that it may command and hear, and
 parameters. `client.playing` runs it.

@@ -167,7 +167,7 @@ class Replay:
     # --- requests ----------------------------------------------------------------------------------------------------
 
     def status(self) -> dict[str, Any]:
-        """Return the state of the replay, and what it plays."""
+        """Return the state of the replay, and its deployment."""
         return self.request("status")
 
     def pause(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Readings and commands as vectors of numbers, for what learns: columns with names, units and limits.
+"""Readings and commands as vectors of numbers, for learning: columns with names, units and limits.
 
 The columns are those of the declared sensors and actuators, in the order of (robot, channel), and within a channel
 those of its fields. Values are in SI units. Readings and commands without a fixed count of numbers have no columns.

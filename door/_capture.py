@@ -1,4 +1,4 @@
-"""Captures in Python: what they hold, and whether the world computed again is the captured one."""
+"""Captures in Python: their content, and whether the recomputed world equals the captured one."""
 
 from __future__ import annotations
 

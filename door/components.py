@@ -146,7 +146,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import what link models return where one is made: no other component needs the network."""
+    """Import the results of link models at their first use: no other component needs the network."""
     import sys
 
     if name == "Judged":

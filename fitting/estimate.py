@@ -50,7 +50,7 @@ HOP_MOST: Final = Start(0.003, 0.003, 0.05, 0.05, 0.3)
 """A standard error is at most that, and of surfaces at most SCALES."""
 TRIES_MAX: Final = 60
 SLOW: Final = 0.1
-"""m/s: what comes to a wall more slowly may as well have been lost in the noise."""
+"""m/s: slower rebounds are within the noise."""
 BESIDE: Final = 4
 """The count of points over which speeds before and after a rebound are measured."""
 KNOWN: Final = 0.5
@@ -144,7 +144,7 @@ def _noise(found: Any) -> float:
 
 
 def _errors(found: Any) -> Array:
-    """Return the standard errors of what was fitted, infinite where nothing determines them.
+    """Return the standard errors of the fitted values, infinite for undetermined ones.
 
     They are the roots of the diagonal of the inverse of J^T J, times the variance of the residuals.
     """
@@ -217,7 +217,7 @@ def _bounce(tracks: Sequence[Array], field: Field) -> float | None:
 class _Problem:
     """The residuals of all tracks and their derivatives, by the fitted vector: surfaces, then starts.
 
-    `is_held`: surfaces are held to what the fit began with, by residuals of their own.
+    `is_held`: surfaces are held to the start of the fit, by residuals of their own.
     """
 
     def __init__(
@@ -233,7 +233,7 @@ class _Problem:
         self.hop_most = np.array([*(getattr(SCALES, name) for name in names), *HOP_MOST * len(tracks)])
 
     def solve(self, vector: Array) -> Any:
-        """Return what scipy finds that begins with this vector. Raises NoLeastSquares."""
+        """Return scipy's result from this start. Raises NoLeastSquares."""
         try:
             from scipy.optimize import least_squares
         except ImportError:

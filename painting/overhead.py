@@ -107,7 +107,7 @@ class OverheadPainter:
 
 
 def _standing(scene: Scene) -> Region:
-    """Return the region of what stands, with a margin: scenery above the ground, else bodies on fixed bases."""
+    """Return the region of all that stands, with a margin: scenery above the ground, else bodies on fixed bases."""
     boxes = [shape_box(shape) for shape in scene.scenery]
     boxes = [box for box in boxes if box[1][2] > STANDING_M]
     if not boxes:

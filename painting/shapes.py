@@ -89,7 +89,7 @@ class Shapes:
         ]
 
     def covered(self, poses: Sequence[Pose], view: View) -> Covered:
-        """Return what the shapes cover, with their links at these poses."""
+        """Return the pixels that the shapes cover, with their links at these poses."""
         count = len(self._links)
         positions = np.array([position for _, position, _ in poses])[self._links]
         turned = np.array([orientation for _, _, orientation in poses])[self._links]
@@ -205,7 +205,7 @@ def _round_size(shape: Shape) -> tuple[float, float, float] | None:
 
 
 def covered_by_surface(shape: Shape, pose: Pose, view: View) -> Covered | None:
-    """Return what a shape whose link is at this pose covers, with the height of its surface at each pixel.
+    """Return the pixels that a shape with its link at this pose covers, with the height of its surface at each.
 
     None for round shapes.
     """

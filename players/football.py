@@ -70,7 +70,7 @@ class Following:
 
 
 class Hand:
-    """Plays one rod: strikes what it can, and waits in its own way for the rest."""
+    """Plays one rod: strikes balls in reach, and otherwise waits in its own way."""
 
     def __init__(self, rod: Rod, waiting: Waiting) -> None:
         self.rod = rod
@@ -137,7 +137,7 @@ def _striker(deployment: Deployment, team: str) -> list[Hand]:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Keeper(Player):
-    """Guards with the goal and defence rods, and clears what it can reach. Parameter: `team`, red or blue."""
+    """Guards with the goal and defence rods, and clears balls in reach. Parameter: `team`, red or blue."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
         team = team_of(parameters)

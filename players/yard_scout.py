@@ -189,7 +189,7 @@ class Scout(Player):
                 return self._back()
         return STANDING
 
-    # --- what it does next -------------------------------------------------------------------------------------------
+    # --- decisions ---------------------------------------------------------------------------------------------------
 
     def _wait(self) -> Motion:
         """Begin with the next crate, when it may."""
@@ -282,7 +282,7 @@ class Scout(Player):
         self.phase = "look" if self._is_lost else "wait"
         return STANDING
 
-    # --- what it sees ------------------------------------------------------------------------------------------------
+    # --- perception --------------------------------------------------------------------------------------------------
 
     def _ahead(self, distances: tuple[float, ...]) -> float:
         """Return the distance ahead of the scanner to the next thing (m)."""

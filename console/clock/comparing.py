@@ -1,6 +1,6 @@
 """The distance between two sources on one clock, published point by point while it is computed.
 
-Of two recordings all of the time that both have is compared; of a source that has its own clock, what it shows while
+Of two recordings the common time is compared; of a source with its own clock, its moments while
 a browser looks.
 """
 

@@ -76,7 +76,7 @@ class Desk:
         return f"{robot}/{actuator}: job {job.number} is cancelled" if job.number else f"{robot}/{actuator}: not sent"
 
     def turn(self) -> None:
-        """Receive for a moment, and send what is due. Raises RunEnded, NotJoined and ConnectionFailed."""
+        """Receive for a moment, and send due commands. Raises RunEnded, NotJoined and ConnectionFailed."""
         self._client.receive(AGAIN_S)
 
     def jobs(self) -> list[dict[str, Any]]:

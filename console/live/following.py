@@ -38,7 +38,7 @@ Files = Callable[[Deployment], Mapping[str, bytes]]
 
 
 class World:
-    """The known world of a run: how it is drawn, and what is kept of what was received."""
+    """The known world of a run: its drawing, and the kept part of the received data."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.drawing = Drawing(deployment)
@@ -52,7 +52,7 @@ class World:
 
 
 def readable(name: str) -> str:
-    """Return an operator's name without what makes it unique: `operator (process 4711)`, or that of its certificate."""
+    """Return an operator's name without its unique part: `operator (process 4711)`, or that of its certificate."""
     alone = _OWN_NAME.fullmatch(name)
     return f"{alone[1]} (process {alone[2]})" if alone else _CERTIFIED.sub("", name)
 
@@ -80,7 +80,7 @@ class Following:
     def world_of(self, what: Mapping[str, Any], files: Files) -> World:
         """Return the world of an answer to `describe`: the present one where it is the same.
 
-        It may take a while, and changes nothing: for a thread. Raises Refused for what cannot be read.
+        It may take a while, and changes nothing: for a thread. Raises Refused for unreadable content.
         """
         if self._world is not None and what["deployment"] == self._text:
             return self._world
@@ -156,7 +156,7 @@ class Following:
         return [] if world is None or world.newest is None else world.drawing.overlays(world.newest, wanted)
 
     def listen(self, wanted: Wanted) -> None:
-        """Set what browsers watch from now on: nothing else is received."""
+        """Set the data that browsers watch from now on: nothing else is received."""
         self._wanted = wanted
         if self._world is not None:
             self._world.history.listen(wanted)

@@ -33,7 +33,7 @@ ROW_BYTES: Final = 256
 Points = list[tuple[float, float]]
 Numbers = NDArray[np.floating[Any]]
 Row = tuple[int, Any, Numbers]
-"""The tick, what the numbers are, the numbers; empty where a gap precedes the next row."""
+"""The tick, the names of the numbers, the numbers; empty where a gap precedes the next row."""
 _HOLE: Final[Numbers] = np.empty(0)
 
 
@@ -74,7 +74,7 @@ class Rows:
         return self._rows[-1][1] if self._rows else None
 
     def reader(self, place_in: Callable[[Any], int | None], *, has_gaps: bool = False) -> Callable[[], Points]:
-        """Return what makes the points of one of the numbers of the rows that there are, in any thread.
+        """Return a function for the points of one number of the kept rows, for any thread.
 
         `place_in` gives its place from what the numbers of a row are. Not a number is the value of a hole; in a row it
         is a hole too where the rows have gaps, else no point.
@@ -164,7 +164,7 @@ class History:
                 rows.keep(tick, reading, numbers)
 
     def reader(self, curve: Curve) -> Callable[[], Points]:
-        """Return what makes the points of a curve."""
+        """Return a function for the points of a curve."""
         if curve.field is not None:
             return self._frames.reader(lambda _: curve.field, has_gaps=True)
         if curve.status:

@@ -36,7 +36,7 @@ VERBS: Final = (
 POLL_S: Final = 0.25
 """Period of status requests while a browser watches."""
 UNSEEN_S: Final = 1.0
-"""How often it is while none does: a page that is opened later scrolls back."""
+"""The period without a browser: a page that is opened later scrolls back."""
 RENEW_S: Final = 1.5
 QUESTION_S: Final = 3.0
 """How long a status is waited for; a supervisor that does not answer is looked for again."""
@@ -258,7 +258,7 @@ class LiveSource:
             await self._in_thread(partial(watch, hz=wanted["hz"]))
 
     def _take_frame(self, feed: Feed, payload: bytes) -> None:
-        """Show a commit, and from time to time what lies over it."""
+        """Show a commit, and from time to time its overlays."""
         wanted = self._wanted
         if not wanted.readers:
             return  # a lease ends after a while
@@ -274,7 +274,7 @@ class LiveSource:
 
 
 class _Newest(Inbox):
-    """An inbox that has the event loop take the newest frame: what came before it is old by then."""
+    """An inbox that has the event loop take the newest frame and drop older ones."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[bytes], None]) -> None:
         super().__init__(FRAMES_MAX)

@@ -102,7 +102,7 @@ def explain_drops(
 ) -> list[tuple[PacketRow, Explained]]:
     """Return the last drops of a link that the vHub reports under `watched`, oldest first, each explained.
 
-    `frame(tick)` is the newest frame that was shown at or before a tick: None hides what each wall took of a signal.
+    `frame(tick)` is the newest frame that was shown at or before a tick: None hides the loss of a signal at each wall.
     """
     rows = msgspec.convert(report["drops"].get(f"{link[0]}>{link[1]}", []), list[PacketRow])
     here = [ClientRow(0, name, "joins", 0, []) for name in report["here"]]

@@ -118,7 +118,7 @@ def _status(history: CaptureHistory, curve: Curve, tick: int) -> float | None:
 def reading_points(
     history: CaptureHistory, robot: str, channel: str, after_ns: int, until_ns: int
 ) -> list[tuple[int, list[float]]]:
-    """Return what a robot sent on a channel in a time: tick and numbers of each reading. Raises CaptureError."""
+    """Return the readings of a robot on a channel in a time: tick and numbers of each. Raises CaptureError."""
     recording = history.recording
     try:
         codec = channel_codec(recording.deployment, robot, channel)

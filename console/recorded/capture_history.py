@@ -56,7 +56,7 @@ class CaptureHistory:
 
     @property
     def share(self) -> float:
-        """How much of what there is was read, 0 to 1."""
+        """The share of the rows that was read, 0 to 1."""
         rows = sum(self._there(topic) for topic in self._done)
         return sum(self._done.values()) / rows if rows else 1.0
 

@@ -1,6 +1,6 @@
 """A capture as a source of the page: played, sought and stepped to the tick, with marks, links and drops at that time.
 
-Two threads read: one what is seen, so that the slider does not wait, one what happened, in slices. Each has the capture
+Two threads read: one the view, so that the slider does not wait, one the events, in slices. Each has the capture
 open by itself. A capture that is still being written is looked at again every second.
 """
 
@@ -59,7 +59,7 @@ class FileSource:
         recompute: Recompute | None = None,
         compare: Compare | None = None,
     ) -> None:
-        """`offset_ns`: this capture's time at time 0 of the clock. `compare`: what it is compared with.
+        """`offset_ns`: this capture's time at time 0 of the clock. `compare`: the other side of a comparison.
 
         Raises CaptureError.
         """
@@ -108,7 +108,7 @@ class FileSource:
                 pool.shutdown(wait=False, cancel_futures=True)
 
     def opened(self, *, links: bool = False) -> Callable[[], Where]:
-        """Return what opens the capture once more, for a comparison in a thread of its own."""
+        """Return a function that opens the capture once more, for a comparison in a thread of its own."""
         return lambda: Whereabouts(Recording(self.recording.path), self.offset_ns, links=links)
 
     def covers(self) -> tuple[int, int]:
@@ -120,7 +120,7 @@ class FileSource:
         return await asyncio.get_running_loop().run_in_executor(pool, work, *arguments)
 
     def tick(self) -> int:
-        """Return the own tick at the clock's time, within what there is."""
+        """Return the own tick at the clock's time, within the recording."""
         first, last = self.recording.span
         return min(max((self.clock.time_ns() + self.offset_ns) // self.recording.tick_ns, first), last)
 
@@ -231,7 +231,7 @@ class FileSource:
         return CaptureHistory(Recording(self.recording.path, (PACKETS, CLIENTS)))
 
     async def _refresh(self, feed: Feed) -> None:
-        """Take what was written to the file since; until the capture is finished."""
+        """Read the growing file until the capture is finished."""
         while not self.recording.index.finished:
             await asyncio.sleep(REFRESH_S)
             try:

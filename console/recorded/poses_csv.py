@@ -1,7 +1,7 @@
 """Recorded poses as a table of text: the reality that a simulation is compared with, as motion capture writes it.
 
 The first line names the columns, in any order; the separator is a comma, a semicolon or a tab, and lines that begin
-with `#` are passed by. What `foosim capture export CAPTURE --what poses` writes is such a table.
+with `#` are passed by. `foosim capture export CAPTURE --what poses` writes such a table.
 
 | column | what | unit |
 |---|---|---|

@@ -1,4 +1,4 @@
-"""Recorded poses as a source of the page: a recorded reality, beside or as a ghost in what a capture has.
+"""Recorded poses as a source of the page: a recorded reality, beside a capture or as a ghost in it.
 
 What has the name of a link or an entity of the other source is drawn as that; all else is a small sphere.
 """
@@ -128,7 +128,7 @@ class PosesSource:
 
 
 def _scene(tracks: Mapping[str, Track], deployment: Deployment | None) -> dict[str, Any]:
-    """Return the scene of what a table has: shapes of a deployment where names are its own, markers for the rest."""
+    """Return the scene of a table: shapes of the deployment's entities, markers for other names."""
     links: list[dict[str, Any]] = []
     models: dict[str, str] = {}
     known: dict[str, dict[str, Any]] = {}

@@ -40,7 +40,7 @@ from foosim.world.frame import Frame
 TOPICS: Final = (EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, POSES)
 Kind = Literal["frame", "poses", "computed", "held"]
 """What is seen at a tick: its captured frame, its captured poses, its frame computed again from the captured inputs and
-equal in its digest, or what was captured last before it."""
+equal in its digest, or the last captured one before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Recording:
 
     @property
     def span(self) -> tuple[int, int]:
-        """First and last tick that it has, (0, 0) while it has none."""
+        """First and last tick, (0, 0) while it is empty."""
         times = self.index.places[TICK].log_ns or self.index.places[FRAME].log_ns
         return (times[0] // self.tick_ns, times[-1] // self.tick_ns) if times else (0, 0)
 
@@ -107,7 +107,7 @@ class Recording:
         return self.decoded(DECODERS[topic], self.index.read(topic, number))
 
     def decoded(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
-        """Return what a decoder makes of a message. Raises CaptureError."""
+        """Return a message decoded. Raises CaptureError."""
         return row_of(decoder, message, f"{self.path}: ")
 
     # --- the world at a tick -----------------------------------------------------------------------------------------
@@ -163,7 +163,7 @@ class Recording:
         return self.drawing.known({pose.link: (pose.position, pose.orientation) for pose in poses})
 
     def inputs(self, after: int, until: int) -> Iterator[CapturedTick]:
-        """Yield what led to the ticks after one, up to another. Raises CaptureError where one is missing."""
+        """Yield the inputs of the ticks after one, up to another. Raises CaptureError where one is missing."""
         places = self.index.places[TICK]
         for tick in range(after + 1, until + 1):
             number = places.newest(tick * self.tick_ns)

@@ -29,7 +29,7 @@ TABLE: Final = ".csv"
 """How the name of a table of poses ends; all else is a capture."""
 NAMES_SHOWN: Final = 8
 Recomputing = Callable[[Path], Recompute]
-"""Makes what computes the frames between the captured ones of a capture."""
+"""Makes a function that computes the frames between the captured ones."""
 
 
 def read_offset(second: Path | None, offset: str | None) -> int:

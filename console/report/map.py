@@ -164,7 +164,7 @@ class MapMaker:
         }
 
     def drawn(self) -> dict[str, Any]:
-        """Return the scene as pages read it, without what a view from above leaves out, and the last poses.
+        """Return the scene as pages read it, without parts that are invisible from above, and the last poses.
 
         Both are empty where the capture has no frame.
         """

@@ -52,7 +52,7 @@ class Show(_Message, frozen=True, tag="show"):
 
 
 class Watch(_Message, frozen=True, tag="watch"):
-    """Of which link the last drops are to be explained; of none by null."""
+    """The link whose last drops are explained; null for none."""
 
     source: Place = 0
     link: tuple[Text, Text] | None = None

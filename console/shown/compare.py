@@ -86,7 +86,7 @@ class Course:
         self._is_interrupted = False
 
     def interrupt(self) -> None:
-        """Have a hole before the next point: what was in between is not known."""
+        """Leave a hole before the next point: distances in between are unknown."""
         self._is_interrupted = bool(self._points)
 
     def take(self, tick: int, found: Sequence[Distance]) -> dict[str, Any]:

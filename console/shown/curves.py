@@ -12,7 +12,7 @@ LINK_UNITS: Final[Mapping[str, str]] = {"delay_ms": "ms", "queue_ms": "ms", "los
 
 
 def name_and_unit(curve: Curve) -> tuple[str, str]:
-    """Return what a curve is called, and its unit where that is known without the scene."""
+    """Return the name of a curve, and its unit where that is known without the scene."""
     if curve.link is not None:
         return f"{curve.link[0]} > {curve.link[1]}: {curve.figure}", LINK_UNITS.get(curve.figure, "packets")
     if curve.reading is not None:

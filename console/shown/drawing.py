@@ -2,7 +2,7 @@
 
 The poses are those of `world.kinematics.forward_kinematics`. A link that hangs on the world by fixed joints alone, or
 by one free joint, needs no arithmetic: its pose is constant, or seven numbers of the frame, which are taken for all
-such links at once. The poses and numbers of absent entities are not a number.
+such links at once. The poses and numbers of absent entities are NaN.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Poser:
     def __init__(self, layout: Layout, scene: Scene) -> None:
         count = sum(len(body.links) for body in scene.bodies.values())
         self._rest: NDArray[np.float32] = np.zeros((count, 7), np.float32)
-        """The poses of what never moves; the others' rows are overwritten."""
+        """The poses of fixed links; the rows of other links are overwritten."""
         self._jointed: list[tuple[int, Body, Entity]] = []
         leaving = [entity for entity in layout.entities if entity.can_leave]
         self._flags = np.array([entity.offsets[ABSENT] for entity in leaving], np.intp)

@@ -1,5 +1,5 @@
 """The rule of a link in words: its packets, its settings, its radio, its changes by events of the network at a
-time, and what that amounts to.
+time, and the effective settings.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class Mark:
 
 
 class WorldEvents:
-    """Finds what the rules did between frames, taken in order. The first frame is what later ones are compared with."""
+    """Finds the effects of rules between frames, taken in order. Later frames are compared with the first one."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
@@ -57,7 +57,7 @@ class WorldEvents:
         self._before: Frame | None = None
 
     def take(self, frame: Frame) -> list[Mark]:
-        """Return what happened since the frame before; an earlier or equal frame begins anew."""
+        """Return the marks since the frame before; an earlier or equal frame begins anew."""
         before, self._before = self._before, frame
         if before is None or frame.tick <= before.tick:
             return []
@@ -189,7 +189,7 @@ def edit_text(edit: EditRow) -> str:
 
 
 def _set_text(edit: EditRow) -> str:
-    """Return a description of a field that is set; empty for what comes with a place."""
+    """Return a description of a field that is set; empty for fields that follow from a place."""
     if edit.field == DOWN:
         return f"{edit.name} is {'in' if edit.numbers == [0.0] else 'out of'} service"
     if edit.field == "position":

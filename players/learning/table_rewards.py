@@ -1,4 +1,4 @@
-"""Rewards of the football table for environments: where an episode begins, what it is worth, when it is over.
+"""Rewards of the football table for environments: where an episode begins, its reward, when it is over.
 
 `functools.partial` gives them settings.
 """
@@ -140,7 +140,7 @@ class DefendShot:
         return with_ball(self._deployment, with_feet_up(frame, self._lifted), position, velocity)
 
     def rate(self, before: Frame, after: Frame) -> Mapping[str, float]:
-        """Return 0 until the end, then what became of the shot."""
+        """Return 0 until the end, then the result of the shot."""
         worth = 0.0
         if self.is_over(after):
             worth = -1.0 if score_of(after)[self._other] > self._conceded else 1.0

@@ -1,4 +1,4 @@
-"""A rod's motors as its player foresees them: a reading is old, and what was commanded since moves the rod meanwhile.
+"""A rod's motors as its player foresees them: a reading is old, and later commands move the rod meanwhile.
 
 The loop is that of the actuator `rod_position`: once a tick, target speed = gain x error, within +-speed; the motor
 reaches it with at most its acceleration without a load. What else moves a rod, the next reading shows.

@@ -23,7 +23,7 @@ from foosim.world.sensors.encoder import RodPosition
 TURN: Final = 2.0 * pi
 SWING_S_MAX: Final = 0.1
 CLEAR_M: Final = 0.004
-"""Beyond this distance beside or behind a ball a foot does not touch it: what noise and delay leave uncertain."""
+"""Beyond this distance beside or behind a ball a foot does not touch it: a margin for noise and delay."""
 NEAR_M: Final = 0.15
 """A rod whose ball is farther away turns back to the turn that it started in."""
 

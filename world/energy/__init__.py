@@ -1,1 +1,1 @@
-"""Energy of robots: batteries and what charges them."""
+"""Energy of robots: batteries and chargers."""

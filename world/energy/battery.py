@@ -86,7 +86,7 @@ def cell_of(settings: BatteryRuleSettings | None, at: Mounting) -> Cell:
 
 
 def chargers_of(settings: BatteryRuleSettings, at: Mounting) -> list[Charger]:
-    """Return what charges a robot: of a rover the stations of its hall, in the order of their names."""
+    """Return the chargers of a robot: for a rover the stations of its hall, in the order of their names."""
     if not is_rover(at.spec, at.robot):
         return settings.chargers
     station = hall_of(at.spec).station

@@ -1,1 +1,1 @@
-"""Rules of entities: what an entity does by itself after it was solved, one file each."""
+"""Rules of entities: changes of an entity after it was solved, one file each."""

@@ -1,4 +1,4 @@
-"""The battery of a robot: what standing and going take from it, and what chargers give. Empty, it stops the drives.
+"""The battery of a robot: the costs of idling and moving, and the power of chargers. Empty, it stops the drives.
 
 In a tick of dt the charge falls by idle power x dt + drag x way, and rises by power x dt for each charger within whose
 radius the robot is, between 0 and the capacity. The way of a rover is that of its wheels, of any other robot the
@@ -71,7 +71,7 @@ class Battery(EntityRule):
         return view.numbers[self._charge.at] > 0.0
 
     def apply(self, view: WritableView) -> None:
-        """Take what a tick costs, and give what chargers give."""
+        """Subtract the cost of a tick, and add the energy from chargers."""
         charge = view.numbers[self._charge.at] - self._idle * self._dt - self._drag * self._way(view)
         chargers = [*self._standing, *self._places(view)] if self._tagged else self._standing
         if chargers:

@@ -146,7 +146,7 @@ class RigidDifferentialDrive(Model):
         return rigid_body(self._settings, self._at.robot.name, GREEN)
 
     def wheels(self) -> Wheels:
-        """Return its wheels and their motors; how far they slip follows from what they feel."""
+        """Return its wheels and their motors; their slip follows from friction."""
         its = self._settings
         motors = WheelMotors(its.wheel_radius, its.torque, self._rates, self._tick_s)
         return Wheels(its.track, its.speed, its.acceleration, its.turn_rate, motors=motors)
@@ -205,7 +205,7 @@ class DifferentialDrive(Model):
         return body_of(settings, self._at.robot.name, "differential_drive", BLUE, settings.speed)
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles."""
+        """Return its cylinder for obstacles."""
         return upright(self._settings)
 
     def wheels(self) -> Wheels:

@@ -144,7 +144,7 @@ class Holonomic(Model):
         return body_of(self._settings, self._at.robot.name, "holonomic", TEAL, self._settings.speed)
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles."""
+        """Return its cylinder for obstacles."""
         return upright(self._settings)
 
     def place(self, view: WritableView) -> None:

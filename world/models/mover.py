@@ -224,7 +224,7 @@ class Mover(Model):
         return Body(name, "mover", ORIGIN, (link,), (0.0, 0.0, height), self._path.fastest)
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles: the cylinder in which it can have any heading."""
+        """Return its cylinder for obstacles, in which it can have any heading."""
         length, width, height = self._settings.size()
         radius = length / 2 if self._settings.shape != "box" else sqrt(length * length + width * width) / 2
         return Upright(radius, 0.0, height)

@@ -1,4 +1,4 @@
-"""A motorised rod of the football table with its figures: what slides and turns about one axis."""
+"""A motorised rod of the football table with its figures, which slides and turns about one axis."""
 
 from __future__ import annotations
 

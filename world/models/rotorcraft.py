@@ -194,7 +194,7 @@ class Rotorcraft(Model):
         return body_of(self._settings, self._at.robot.name, "rotorcraft", WHITE, self._fastest())
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles."""
+        """Return its cylinder for obstacles."""
         return upright(self._settings)
 
     def place(self, view: WritableView) -> None:

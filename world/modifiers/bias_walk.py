@@ -35,7 +35,7 @@ class BiasWalkSettings(ModifierSettings):
     slots=lambda settings, about: {"offset": about.size},
 )
 class BiasWalk(Modifier):
-    """Adds an offset that walks to each number; what it has walked is in the frame."""
+    """Adds an offset that walks to each number; the offset is in the frame."""
 
     def __init__(self, settings: BiasWalkSettings, at: ModifierMounting) -> None:
         from foosim.common.batched.noise import NoiseAhead, NoiseKey  # brings numpy, which readers of settings need not

@@ -1,6 +1,6 @@
 """How far upright bodies may go: none enters scenery, a rigid body or another body that moves by kinematics.
 
-A body that moves by kinematics is a vertical cylinder (`moving.upright`), an obstacle is what overlaps its band of
+A body that moves by kinematics is a vertical cylinder (`moving.upright`), an obstacle is a shape in its band of
 heights, seen from above (`solids`). A blocked way is halved. Others that move so are where they were at
 the tick's start, and each stays on its own side of the plane half-way between two (a buffered Voronoi cell: Zhou, Wang,
 Bandyopadhyay, Schwager, IEEE RA-L 2(2), 2017): an upright plane, or a level one where two are one above the other. So
@@ -43,7 +43,7 @@ HALVINGS: Final = 7
 SKIN_M: Final = 0.25
 """The pairs that may meet are looked up anew when a body has moved this far since, in x or y."""
 GAP_M: Final = 1e-6
-"""Half of what stays between two that move: far above rounding."""
+"""Half of the gap between two movers: far above rounding."""
 ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
 

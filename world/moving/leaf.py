@@ -1,4 +1,4 @@
-"""What is in the way of a leaf, such as a door's: an upright box with a heading that slides among robots and objects.
+"""Obstacles of a leaf, such as a door's: an upright box with a heading that slides among robots and objects.
 
 A cylinder around a leaf would fill its doorway, so it is compared as a rectangle, seen from above, with its heights.
 What moves by kinematics is a cylinder, grown by how far it may come within the tick, so that both never overlap. Rigid

@@ -1,1 +1,1 @@
-"""The parts of kits: the settings of their sections, and what follows from these alone."""
+"""The parts of kits: the settings of their sections, and values that follow from these alone."""

@@ -75,7 +75,7 @@ class Station(SpecBase):
 
 
 class Hall(SpecBase):
-    """The whole hall: its bounds, which are walls, and what its rovers and base stations are like."""
+    """The whole hall: its bounds, which are walls, and the properties of its rovers and base stations."""
 
     length: Side
     width: Side

@@ -1,4 +1,4 @@
-"""Actuators of joints: which joints of a robot one drives, and what these can do."""
+"""Actuators of joints: the driven joints of a robot and their limits."""
 
 from __future__ import annotations
 

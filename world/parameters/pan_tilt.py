@@ -29,7 +29,7 @@ class PanTiltSettings(JointLoopSettings):
 
 
 def pan_tilt_slots(settings: PanTiltSettings, carrier: Carrier) -> Mapping[str, int]:
-    """Return the slots of what drives them. Raises BadValue."""
+    """Return the slots of their drives. Raises BadValue."""
     return {**loop_points(settings, carrier), **SLOTS}
 
 

@@ -1,4 +1,4 @@
-"""Rigid objects of one shape: their settings, and what their models have in common."""
+"""Rigid objects of one shape: their settings, and the common part of their models."""
 
 from __future__ import annotations
 

@@ -172,7 +172,7 @@ class Line(SpecBase):
 class SlideAxis(SpecBase):
     """A rod's motor along y: target speed = gain (1/s) x error, within +-speed, at no more than the force.
 
-    Nor more than what accelerates the rod by `acceleration` without a load, where that is given.
+    Nor more than accelerates the rod by `acceleration` without a load, where that is given.
     """
 
     speed: Speed
@@ -184,7 +184,7 @@ class SlideAxis(SpecBase):
 class SpinAxis(SpecBase):
     """A rod's motor around y: target speed = gain (1/s) x error, within +-speed, at no more than the torque.
 
-    Nor more than what accelerates the rod by `acceleration` without a load, where that is given.
+    Nor more than accelerates the rod by `acceleration` without a load, where that is given.
     """
 
     speed: Spin

@@ -1,1 +1,1 @@
-"""Rules of worlds: what a world does by itself before a tick is solved, one file each."""
+"""Rules of worlds: events before a tick is solved, one file each."""

@@ -227,7 +227,7 @@ class Football(Rule):
         end = "" if not status["is_over"] else f", {status['winner']} has won" if status["winner"] else ", a draw"
         return f"{red} {ours} : {theirs} {blue}{end}"
 
-    # --- what happened -----------------------------------------------------------------------------------------------
+    # --- events ------------------------------------------------------------------------------------------------------
 
     def marks(self, before: Frame, after: Frame) -> Iterator[Marked]:
         """Yield goals, kick-offs and why balls came back, to the tick, by the counted ticks."""
@@ -287,7 +287,7 @@ class Football(Rule):
 
 
 class _Ball:
-    """Where a ball's numbers are, and what the rules remember of it."""
+    """The places of a ball's numbers, and of the rules' memory of it."""
 
     def __init__(self, at: RuleMounting, entity: Entity) -> None:
         self.entity = entity

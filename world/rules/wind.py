@@ -1,6 +1,6 @@
 """Wind: the velocity of the air around rigid bodies. It does not act on bodies that move by kinematics.
 
-The engine `mujoco` computes what it does to a body, by MuJoCo's inertia box model of a passive medium (MuJoCo's
+The engine `mujoco` computes its force on a body by MuJoCo's inertia box model of a passive medium (MuJoCo's
 documentation, Computation, section "Fluid forces"): the force along each axis of the box that has the body's mass and
 moments of inertia is -density / 2 x A |v| v - 3 pi x viscosity x D v, with v of the body relative to the air, A the
 box's area across that axis and D the mean of its sides; likewise it damps how the body turns. No body
@@ -68,7 +68,7 @@ class Wind(Rule):
         self._at = at
 
     def place(self, view: WritableView) -> None:
-        """Set it to what it is at tick 0."""
+        """Set it to its value at tick 0."""
         for axis, speed in self._start.items():
             view.write(self._at.slot(axis), speed)
 

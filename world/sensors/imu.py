@@ -1,4 +1,4 @@
-"""An inertial measurement unit: what an accelerometer and a gyroscope measure at a place on a robot.
+"""An inertial measurement unit: accelerometer and gyroscope at a place on a robot.
 
 An accelerometer measures the specific force f = a - g, its acceleration less that of free fall, in its own axes; one at
 rest shows the gravity upwards (Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems,

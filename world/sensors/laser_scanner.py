@@ -63,7 +63,7 @@ class Scan(Struct, frozen=True):
 
 @sensor("laser_scanner", LaserScannerSettings, Scan, array_length="rays", shown_as="foxglove.LaserScan")
 class LaserScanner(Sensor):
-    """The distance to what each beam meets, the robot's own body aside; the range where that is nothing."""
+    """The distance to the first thing on each beam other than the robot's own body; the range for none."""
 
     def __init__(self, settings: LaserScannerSettings, at: Mounting) -> None:
         self.least_m, self.range_m = settings.least, settings.range
@@ -83,7 +83,7 @@ class LaserScanner(Sensor):
 
     @staticmethod
     def rays(sensors: Sequence[LaserScanner], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each beam: from the mount to what it meets, or as far as the sensor reaches."""
+        """Return both ends of each beam: from the mount to the first thing, or as far as the sensor reaches."""
         far = np.array([[one.range_m] for one in sensors])
         return BeamsTogether([one.beams for one in sensors]).ends(numbers, np.zeros_like(far), far)
 

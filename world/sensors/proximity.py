@@ -74,7 +74,7 @@ class Proximity(Sensor):
 
     @staticmethod
     def rays(sensors: Sequence[Proximity], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each ray: from a robot's hull to what it meets, or as far as the sensor reaches.
+        """Return both ends of each ray: from a robot's hull to the first thing, or as far as the sensor reaches.
 
         All have as many rays.
         """

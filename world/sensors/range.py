@@ -71,7 +71,7 @@ class RangeFinder(Sensor):
 
     @staticmethod
     def rays(sensors: Sequence[RangeFinder], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each beam: from the mount to what it meets, or as far as the sensor reaches."""
+        """Return both ends of each beam: from the mount to the first thing, or as far as the sensor reaches."""
         found = []
         for one in sensors:  # some have a cone, others a beam
             far = np.array([[one.range_m]])

@@ -53,7 +53,7 @@ class JointPositionActuator(Actuator):
         return tuple(zip(self._group.lows, self._group.highs, strict=True))
 
     def names(self) -> tuple[str, ...]:
-        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        """Return the names of the numbers of a command: the links on the joints."""
         return self._group.names
 
     def accept(self, command: JointPositions, view: WritableView) -> bool:

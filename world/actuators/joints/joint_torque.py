@@ -44,7 +44,7 @@ class JointTorqueActuator(Actuator):
         return tuple((-force, force) for force in self._group.forces)
 
     def names(self) -> tuple[str, ...]:
-        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        """Return the names of the numbers of a command: the links on the joints."""
         return self._group.names
 
     def accept(self, command: JointEfforts, view: WritableView) -> bool:

@@ -1,4 +1,4 @@
-"""Joints along positions at times: what a planner of arms returns. A job is done when the last of them is reached."""
+"""Joints along positions at times, as from a planner of arms. A job is done when the last of them is reached."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ class JointTrajectory(Actuator):
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor.
 
-        The loop's set-point leads the way by what makes a joint that is on it as fast as it.
+        The loop's set-point leads the way so far that a joint on the way has its speed.
         """
         times, ways = self._way(view)
         since_s, lead = self._since_s(view, view.tick), 1.0 / (self._gain * self._tick_s)

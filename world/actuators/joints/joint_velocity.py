@@ -1,4 +1,4 @@
-"""Joints at speeds: what a motor with a speed controller does."""
+"""Joints at speeds, as by motors with speed controllers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class JointVelocityActuator(Actuator):
         return tuple((-speed, speed) for speed in self._group.speeds)
 
     def names(self) -> tuple[str, ...]:
-        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        """Return the names of the numbers of a command: the links on the joints."""
         return self._group.names
 
     def accept(self, command: JointVelocities, view: WritableView) -> bool:

@@ -1,1 +1,1 @@
-"""Models of what robots have to get along with: fires, doors."""
+"""Models of hazards to robots: fires, doors."""

@@ -126,7 +126,7 @@ class Door(Model):
     """
 
     is_upright = False
-    """To others it is what its shape is, and no cylinder."""
+    """Others meet its shape, not a cylinder."""
 
     def __init__(self, settings: DoorObject, at: Mounting) -> None:
         self._settings, self._at = settings, at

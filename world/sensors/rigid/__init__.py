@@ -1,1 +1,1 @@
-"""Sensors of rigid bodies: what they touch and hold."""
+"""Sensors of rigid bodies: touches and grasps."""
