@@ -175,7 +175,7 @@ class CommandVector:
         numbers: list[float] = vector.tolist()
         if not all(map(isfinite, numbers)):
             number, column = next(pair for pair in zip(numbers, self.columns, strict=True) if not isfinite(pair[0]))
-            raise BadValue(f"non-finite {column.field} of {column.robot}", number)
+            raise BadValue(f"{column.field} of {column.robot} is not finite", number)
         clipped = [
             low if number < low else high if number > high else number
             for number, low, high in zip(numbers, self._lows, self._highs, strict=True)

@@ -64,7 +64,7 @@ def test_what_is_no_command() -> None:
     vector = CommandVector(DEPLOYMENT, ["red.goal"], ["red.goal/*"])
     with pytest.raises(BadValue, match=r"an action of shape .*; expected \(2,\)"):
         vector.packets(np.zeros((1, 2)))
-    with pytest.raises(BadValue, match=r"non-finite spin of red.goal, nan"):
+    with pytest.raises(BadValue, match=r"spin of red.goal is not finite, nan"):
         vector.packets(np.array([0.0, np.nan]))
     with pytest.raises(UnknownName, match=r"selects no robot/channel .there are: red.goal/position.*red.gaol"):
         CommandVector(DEPLOYMENT, ["red.goal"], ["red.gaol/*"])

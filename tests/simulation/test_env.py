@@ -232,7 +232,7 @@ def test_a_goal_is_worth_as_much_to_one_team_as_it_costs_the_other() -> None:
 
 
 def test_who_has_no_team_gets_no_goals() -> None:
-    with pytest.raises(BadValue, match=r"no agent of one team"):
+    with pytest.raises(BadValue, match=r"an agent commands the rods of one team"):
         Goals(read_for_stepping(TABLE), {"both": ("red.goal", "blue.goal")})
 
 
