@@ -2,7 +2,7 @@
 #     make up ARGS='--pace fast --for 20s'
 #     make test ARGS='tests/laws -x'
 
-PACKAGES := analysis capture cli client common console deployment door fitting launcher node painting players process protocol runtime simulation supervisor vhub world
+PACKAGES := analysis capture cli client common console deployment door fitting launcher library node painting process protocol runtime simulation supervisor vhub world
 PYTHON := .venv/bin/python
 SEEDS ?= 100
 FILE ?= deploy/table.yaml
@@ -45,7 +45,7 @@ up: environment
 	@.venv/bin/foosim up deploy/table.yaml $(if $(filter --detach,$(ARGS)),,--console) $(ARGS)
 
 play: environment
-	@$(PYTEST) -m campaign tests/simulation/test_a_minute_of_play.py tests/simulation/test_one_world.py tests/players/test_matches.py tests/laws $(ARGS)
+	@$(PYTEST) -m campaign tests/simulation/test_a_minute_of_play.py tests/simulation/test_one_world.py tests/library/test_matches.py tests/laws $(ARGS)
 
 minutes: environment
 	@$(PYTEST) -o timeout=0 -m campaign tests/simulation/test_swarm.py $(ARGS)

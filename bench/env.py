@@ -17,8 +17,8 @@ import gymnasium
 import numpy as np
 
 from bench.bare_tick import BareTable
-from foosim.players.learning.exercises import PLAYER
-from foosim.players.learning.table_rewards import Goals
+from foosim.library.table.learning.exercises import PLAYER
+from foosim.library.table.learning.table_rewards import Goals
 from foosim.simulation.env import TABLE, FoosimEnv, FoosimParallelEnv, parallel_env
 
 RUNS: Final = 8

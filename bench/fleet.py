@@ -20,9 +20,9 @@ from bench.bare_tick import bare_tick_us
 from bench.meter import Meter
 from foosim.client.player import Player, Samples
 from foosim.deployment.schema import Deployment
+from foosim.library.mobile.v_w import Motion
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
-from foosim.world.actuators.v_w import Motion
 from foosim.world.frame import Frame
 
 SIZES: Final = (200, 1000)

@@ -12,9 +12,8 @@ from pathlib import Path
 from foosim.deployment.loader import apply_sets, check_complete, load_deployment
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.text.files import read_files
-from foosim.world.bodies.urdf import Robot, meshes_of, place_of_mesh, read_urdf
+from foosim.world.bodies.urdf import SUFFIX, Robot, meshes_of, place_of_mesh, read_urdf
 from foosim.world.matter.mesh import AssetError, digest_of
-from foosim.world.models.urdf import SUFFIX
 from foosim.world.scenery import SceneryMesh
 
 

@@ -26,8 +26,10 @@ from foosim.common.units import format_ns, format_rate
 from foosim.deployment.schema import Deployment, Player
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.validate_network import Names, check_network, place_findings, rule_findings
+from foosim.world.air import WindSettings
 from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.components.reach import REACHED
 from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.forms import registry
 from foosim.world.forms.failures import failure_of
@@ -68,11 +70,8 @@ from foosim.world.layout import (
 )
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.moving.upright import stands_upright
-from foosim.world.rules.wind import WindSettings
 from foosim.world.scenery import SceneryMesh
 
-REACHED: Final = ("rod", "ball")
-"""The rigid models that may share a solve (`assembly.islands.table_reach_of`)."""
 SECTIONS: Final = ("sensors", "actuators", "rules")
 """The sections of a robot that have components."""
 Said = dict[tuple[str, str], dict[str, list[str]]]
@@ -880,25 +879,25 @@ def _engine(spec: Deployment, ends: Names) -> Iterator[Finding]:
     engine = spec.engine_type
     winds = [name for name, settings in spec.rules.items() if isinstance(settings, WindSettings)]
     if winds and not engine.islands:
-        what = f"the engine has no air, and the world has the rule {winds[0]}, which is wind"
-        yield Finding(("engine",), what, engine.name, "'mujoco'")
+        what = f"engine {engine.name!r} has no air; rules.{winds[0]} is wind: set engine: mujoco"
+        yield Finding(("engine",), what)
     for name in winds[1:]:
         yield Finding(("rules", name), f"a second wind beside {winds[0]}", name, at="key")
-    body, rod = next(rigid_bodies(spec), None), next(_rods(spec), None)
-    if body is not None and rod is not None:
-        for one, other in ((body, rod), (rod, body)):
+    body, sharing = next(rigid_bodies(spec), None), next(_sharing(spec), None)
+    if body is not None and sharing is not None:
+        for one, other in ((body, sharing), (sharing, body)):
             what = f"{one.what}, which no engine solves beside {'.'.join(other.location)}, {other.what}"
             yield Finding(one.location, what, one.location[-1], at="key")
-    elif body is not None and not engine.islands:
-        what = f"the engine solves rods and balls of a table; {'.'.join(body.location)} is {body.what}"
-        yield Finding(("engine",), what, engine.name, "'mujoco'")
-    elif rod is not None and engine.islands:
-        what = f"the engine solves no rods and balls of a table; {'.'.join(rod.location)} is {rod.what}"
-        yield Finding(("engine",), what, engine.name, "'bullet'")
+        return
+    wrong, needed = (sharing, "bullet") if engine.islands else (body, "mujoco")
+    if wrong is not None:
+        place = ".".join(wrong.location)
+        what = f"engine {engine.name!r} supports only {engine.bodies}; {place} is {wrong.what}: set engine: {needed}"
+        yield Finding(("engine",), what)
 
 
-def _rods(spec: Deployment) -> Iterator[_Rigid]:
-    """Yield the robots, or else the objects of kits, that are rods and balls of a table."""
+def _sharing(spec: Deployment) -> Iterator[_Rigid]:
+    """Yield the robots, or else the objects of kits, that may share a solve."""
     for name, robot in spec.robots.items():
         if (model := robot.component_type).shares_solve:
             yield _Rigid(("robots", name), with_article(model.name))

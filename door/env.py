@@ -4,8 +4,8 @@ To import this registers its environments with Gymnasium: `gymnasium.make("foosi
 """
 
 from foosim.client.vectors import Column
+from foosim.library.table.learning.table_rewards import DefendShot, Goals
 from foosim.painting.overhead import OverheadPainter
-from foosim.players.learning.table_rewards import DefendShot, Goals
 from foosim.simulation.env import TABLE, FoosimEnv, FoosimParallelEnv, Nothing, Reward, parallel_env
 
 __all__ = [

@@ -126,7 +126,7 @@ def match(player: str, parameters: Mapping[str, str], minutes: float) -> str:
     """Return the score of a match over the emulated network: a player as red against the shipped keeper."""
     red = {"class": player, "parameters": {"team": "red", **parameters}}
     sets = [f"players.player-red.{key}={json.dumps(value)}" for key, value in red.items()]
-    sets.append("players.player-blue.class=foosim.players.football:Keeper")
+    sets.append("players.player-blue.class=foosim.library.table.players.football:Keeper")
     with Simulation(TABLE, sets=sets, agents=[], network=True) as simulation:
         simulation.step(ticks=round(minutes * 60e9 / simulation.deployment.tick_ns))
         return "{red} : {blue}".format(**simulation.status["score"])
@@ -149,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> list[float]:
         asked.out.write_text(json.dumps(best.tolist()))
         print(f"kept: mean reward {max(rewards):+.2f}, in {asked.out}", flush=True)
         trained = ("train_keeper:Keeper", {"weights": str(asked.out.absolute())})
-        players = {"standing still": ("foosim.players.football:Passive", {}), "trained": trained}
+        players = {"standing still": ("foosim.library.table.players.football:Passive", {}), "trained": trained}
         scores = pool.map(match, *zip(*players.values(), strict=True), [asked.minutes] * len(players))
         for name, score in zip(players, scores, strict=True):
             print(f"{name} against the shipped keeper: {score}")

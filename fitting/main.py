@@ -20,8 +20,8 @@ from foosim.deployment.text.files import read_source_file
 from foosim.fitting.estimate import Fitted, Result, fit, scatter_of
 from foosim.fitting.motion import Field, Pairs
 from foosim.fitting.tracks import BadTracks, Track, read_tracks, usable
+from foosim.library.table.settings import TABLE, Table, table_of
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
-from foosim.world.parameters.table import TABLE, Table, table_of
 
 app = new_app()
 

@@ -20,7 +20,7 @@ import numpy as np
 from foosim.common import units
 from foosim.common.errors import BadValue, Refused, no_such, show
 from foosim.fitting.motion import Array, Field
-from foosim.world.parameters.table import Goal
+from foosim.library.table.settings import Goal
 
 TRACK: Final = "track"
 QUANTITIES: Final = {"time": units.TIME, "x": units.LENGTH, "y": units.LENGTH}

@@ -9,8 +9,8 @@ import yaml
 
 from foosim.client.player import Player, Samples
 from foosim.deployment.schema import Deployment
-from foosim.players.workshop import HAND_M as FRONT_M
-from foosim.world.actuators.gripper import Grip
+from foosim.library.rigid.gripper import Grip
+from foosim.library.rigid.players.workshop import HAND_M as FRONT_M
 from tests.forms.worlds import DEPLOY
 
 __all__ = ["FRONT_M"]

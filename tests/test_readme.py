@@ -26,9 +26,9 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.library.table.rod_position import Command
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import System
-from foosim.world.actuators.rod_position import Command
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component
 

@@ -51,7 +51,7 @@ def test_packages_outside_of_worlds_name_nothing_of_a_world() -> None:
         if (word := WORD.search(line))
     ]
     named += [str(path.relative_to(ROOT)) for path in found if WORD.search(path.stem)]
-    assert not named, "only world/ and players/ may know what a world is made of:\n" + "\n".join(named)
+    assert not named, "only world/ and library/ may know what a world is made of:\n" + "\n".join(named)
 
 
 FOUND: Final = "balls Rover rover01 red.goal BALL ROVERS ball_ticks _stray_balls free_ball RodRobot meet_rod OF_BALL"

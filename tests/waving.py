@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from foosim.client.player import Commands, Player, Samples
 from foosim.deployment.schema import Deployment
-from foosim.world.actuators.rod_position import Command
+from foosim.library.table.rod_position import Command
 
 PERIOD: Final = 5
 """Ticks: 100 Hz of the table's."""

@@ -7,6 +7,7 @@ from typing import Annotated, Final
 from pydantic import StringConstraints
 
 from foosim.common import units
+from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
 from foosim.world.scene import Quaternion, Vector, from_rpy
@@ -52,3 +53,11 @@ def is_placed(settings: type[SpecBase]) -> bool:
 
 ORIGIN_OF_WORLD: Final = At()
 FIRST_LINK: Final = MountedAt()
+
+
+def leaning(at: At) -> BadValue | None:
+    """Return what is wrong with a place for an upright body."""
+    for key, angle in (("roll", at.roll), ("pitch", at.pitch)):
+        if angle != 0.0:
+            return BadValue(f"an upright body has no {key}", f"{angle:g} rad")
+    return None

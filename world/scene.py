@@ -122,6 +122,8 @@ class Link:
         return self.centre_of_mass == ORIGIN and self.principal == UPRIGHT
 
 
+PRIMITIVES_MAX: Final = 16
+"""Shapes of one link: those of a compound in Bullet."""
 MOVING: Final = frozenset(("prismatic", "revolute", "continuous"))
 """The joints that have a position, a speed and a motor."""
 

@@ -11,13 +11,13 @@ import numpy as np
 from foosim.client.commands import CommandEncoder
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import mark_kinds
+from foosim.world.components.job_reading import JobSettings
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.per_field import codec_of
 from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
-from foosim.world.sensors.job import JobSettings
 from foosim.world.setting.settable import settable
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {

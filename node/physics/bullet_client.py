@@ -8,8 +8,7 @@ from typing import Any, Final
 from foosim.node.physics.quiet import without_lines
 from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Physics, Side
-from foosim.world.parameters.table import PRIMITIVES_MAX
-from foosim.world.scene import UPRIGHT, Box, Capsule, Cylinder, Shape, Sphere, Vector
+from foosim.world.scene import PRIMITIVES_MAX, UPRIGHT, Box, Capsule, Cylinder, Shape, Sphere, Vector
 
 with without_lines(b"pybullet build time:"):
     import pybullet as p

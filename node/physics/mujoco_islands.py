@@ -29,6 +29,7 @@ from foosim.node.physics.mujoco_model import (
     warnings,
     without_names,
 )
+from foosim.world.air import air_of
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene
@@ -38,7 +39,6 @@ from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.matter.physics import Physics
-from foosim.world.rules.wind import air_of
 from foosim.world.scene import (
     MOVING,
     ORIGIN,

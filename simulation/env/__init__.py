@@ -26,7 +26,7 @@ from foosim.client.jobs import Jobs
 from foosim.client.vectors import Column
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
-from foosim.players.learning.exercises import ENVIRONMENTS, TABLE
+from foosim.library.table.learning.exercises import ENVIRONMENTS, TABLE
 from foosim.simulation.agents import agents_of
 from foosim.simulation.env.episodes import Episodes, Nothing, Reward
 from foosim.simulation.simulation import Simulation, read_for_stepping
@@ -209,7 +209,7 @@ def parallel_env(deployment: Deployment | str | Path = TABLE, **arguments: Any) 
     * `network`: whether packets go through the network that the deployment declares; without, readings arrive at once,
       and so do commands.
     * `reward`: a class as `Reward` describes it, made with the deployment and the robots of each agent; those of
-      the table are in `foosim.players.learning.table_rewards`. By default `Nothing`.
+      the table are in `foosim.library.table.learning.table_rewards`. By default `Nothing`.
     * `seconds`: the simulated time, more than 0, after which an episode is cut; by default never.
     * `start`: the frame that episodes begin with, a `Frame`, a `Start` or `CAPTURE@12.5s`; by default the first one.
     * `readings`, `commands`: globs of `robot/channel` that select among what agents hear and command.

@@ -37,7 +37,7 @@ Robots: TypeAlias = Mapping[str, tuple[str, ...]]
 class Reward(Protocol):
     """What an episode begins with, what it is worth, and when it is over.
 
-    It is made for a deployment and its agents; `foosim.players.learning` has those of worlds that come with foosim.
+    It belongs to a deployment and its agents; `foosim.library.table.learning` has the ones of the table.
     """
 
     def begin(self, frame: Frame, seed: int) -> Frame:

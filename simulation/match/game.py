@@ -16,7 +16,7 @@ from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.common.units import format_ns
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.players import OF_THE_TABLE
+from foosim.library.table.players import OF_THE_TABLE
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
 from foosim.world.assembly.initial_state import initial_frame

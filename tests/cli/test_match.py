@@ -63,7 +63,7 @@ def test_worse_networks_have_a_row_each_and_a_picture(command: Command, tmp_path
     [
         (["teem", "passive"], UNKNOWN),
         (["team", "nowhere:Class"], "B: there is no module nowhere"),
-        (["team", "foosim.players.football:Taem"], "B: "),
+        (["team", "foosim.library.table.players.football:Taem"], "B: "),
         (["team", "passive", "--games", "0"], "--games"),
         (["team", "passive", "--minutes", "0"], "--minutes"),
         (["team", "passive", "--jobs", "0"], "--jobs"),

@@ -133,14 +133,14 @@ def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_
     command: Command, tmp_path: Path
 ) -> None:
     path, text = tmp_path / "own.yaml", apart()
-    assert text.count("class: foosim.players.football:Team") == 2
-    path.write_text(text.replace("class: foosim.players.football:Team", "class: own_team:Team"))
+    assert text.count("class: foosim.library.table.players.football:Team") == 2
+    path.write_text(text.replace("class: foosim.library.table.players.football:Team", "class: own_team:Team"))
     done = command("check", path)
     assert done.code == 2
     whose = [line.split(": ")[1] for line in done.err.splitlines()]
     assert whose == ["players.player-red.class", "players.player-blue.class"]
     lines = text.splitlines()
-    number = next(at for at, line in enumerate(lines, 1) if "foosim.players.football:Team" in line)
+    number = next(at for at, line in enumerate(lines, 1) if "foosim.library.table.players.football:Team" in line)
     place = f"{path}:{number}:{lines[number - 1].index('foosim.') + 1}: "
     missing = "there is no module own_team (it is neither beside the deployment nor on PYTHONPATH), 'own_team:Team'"
     assert done.err.splitlines()[0] == f"{place}players.player-red.class: {missing}"
@@ -161,14 +161,14 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (("--set", "seed=2", "--set", "engine=bulet"), 2, "--set:2:8: engine: "),
         (("--engine", "bulet"), 2, "nearest is 'bullet'"),
         (
-            ("--set", "players.player-red.class=foosim.players.football.Team"),
+            ("--set", "players.player-red.class=foosim.library.table.players.football.Team"),
             2,
-            "nearest is 'foosim.players.football:Team'",
+            "nearest is 'foosim.library.table.players.football:Team'",
         ),
         (
-            ("--set", "players.player-red.class=foosim.players.football:Teem"),
+            ("--set", "players.player-red.class=foosim.library.table.players.football:Teem"),
             2,
-            "nearest is 'foosim.players.football:Team'",
+            "nearest is 'foosim.library.table.players.football:Team'",
         ),
         (
             ("--set", "players.player-red.class=own:Acts"),
@@ -270,7 +270,7 @@ def test_without_a_live_run_there_is_nobody_to_control(command: Command, argumen
         ),
         (("rate", "0x"), "foosim rate PACE: out of range 0.001x to 1000x, '0x'"),
         (("rate", "-1x"), "foosim rate PACE: out of range 0.001x to 1000x, '-1x'"),
-        (("push", "0", "nan", "0"), "impulse: not a finite number, nan"),
+        (("push", "0", "nan", "0"), "impulse: three numbers are needed, X Y Z in N s; not all of these are numbers, '0 nan 0'"),
         (("push", "0", "-1"), "impulse: three numbers are needed, X Y Z in N s; here are 2, '0 -1'"),
         (
             ("push", "0", "1", "x"),

@@ -14,7 +14,7 @@ from foosim.cli.rehearse import app
 from foosim.client.errors import PlayerError
 from foosim.client.loading import class_faults, load_player
 from foosim.common.errors import DeploymentError
-from foosim.players.football import Team
+from foosim.library.table.players.football import Team
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 OWN = """
@@ -72,8 +72,9 @@ CASES = [
     ("own_playr:Acts", "there is no module own_playr (it is neither beside the deployment nor on PYTHONPATH),"
      " nearest is 'own_player:Acts'"),
     ("own_player.acts:Acts", "there is no module own_player.acts (own_player is a module, not a package)"),
-    ("foosim.players.footbal:Team",
-     "there is no module foosim.players.footbal, nearest is 'foosim.players.football:Team'"),
+    ("foosim.library.table.players.footbal:Team",
+     "there is no module foosim.library.table.players.footbal, "
+     "nearest is 'foosim.library.table.players.football:Team'"),
     ("own_importer:Acts", "cannot be imported: ModuleNotFoundError: No module named 'own_missing'"
      " (own_importer.py:1)"),
     ("own_broken:Acts",
@@ -102,7 +103,7 @@ def test_a_class_that_cannot_be_loaded_says_why(modules: Path, path: str, text: 
 
 @pytest.mark.usefixtures("modules")
 def test_a_class_is_found_by_its_path() -> None:
-    assert load_player("foosim.players.football:Team") is Team
+    assert load_player("foosim.library.table.players.football:Team") is Team
     assert load_player("own_player:Acts").__name__ == "Acts"
     assert load_player("own_player:Nothing")(None, {}).act(0, {}) == {}, "all hooks of a player are empty"
 
@@ -115,12 +116,14 @@ def test_all_that_cannot_play_is_found_and_what_modules_print_goes_to_standard_e
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     paths = ("own_leaver:A", "own_player:Acts", "own_player:Atcs", "own_player:Sits")
-    faults = class_faults((*paths, "foosim.players.football:Team", "foosim.players.football:Teem"), 60.0)
+    faults = class_faults(
+        (*paths, "foosim.library.table.players.football:Team", "foosim.library.table.players.football:Teem"), 60.0
+    )
     assert {path: fault.problem.partition(" (")[0] for path, fault in faults.items()} == {
         "own_leaver:A": "cannot be imported: SystemExit: 0",
         "own_player:Atcs": "there is no Atcs in own_player",
         "own_player:Sits": "Sits is no Player",
-        "foosim.players.football:Teem": "there is no Teem in foosim.players.football",
+        "foosim.library.table.players.football:Teem": "there is no Teem in foosim.library.table.players.football",
     }
     printed = capfd.readouterr()
     assert (printed.out, "own words" in printed.err) == ("", True)

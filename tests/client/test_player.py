@@ -18,15 +18,15 @@ from foosim.client.playing import PlayerLoop
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
+from foosim.library.table.ball import BallPosition
+from foosim.library.table.encoder import RodPosition
+from foosim.library.table.rod_position import Command
+from foosim.library.table.settings import LINE_NAMES
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
 from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
 from foosim.simulation.run import rehearse
-from foosim.world.actuators.rod_position import Command
-from foosim.world.parameters.table import LINE_NAMES
-from foosim.world.sensors.ball import BallPosition
-from foosim.world.sensors.encoder import RodPosition
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -13,7 +13,7 @@ import pytest
 
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.timeline import Mark, WorldEvents
-from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.loader import apply_sets, read_deployment
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import FAILED, mark_kinds
 from foosim.world.frame import Frame
@@ -104,7 +104,7 @@ def line_of(text: str) -> str:
 
 
 def deployment() -> Any:
-    return load_deployment(apply_sets(TABLE.read_text(), TABLE.name, SETS), TABLE.name)
+    return read_deployment(apply_sets(TABLE.read_text(), TABLE.name, SETS), TABLE.name)
 
 
 ACT: Final = line_of("raise ValueError")

@@ -12,14 +12,14 @@ from foosim.console.live.following import Following, first_frame, readable
 from foosim.console.shown.overlays import Overlays
 from foosim.console.shown.source import About, Moment, Wanted
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.generic.proximity import ProximitySettings
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Commit
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.forms.forms import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
-from foosim.world.parameters.hall import hall_of
-from foosim.world.sensors.proximity import ProximitySettings
 from tests.console.memory import TABLE, table, table_with_spares
 
 

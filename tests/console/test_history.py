@@ -22,11 +22,11 @@ from foosim.console.shown.source import Curve
 from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents, edit_text
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.football import kickoff_ticks
+from foosim.library.table.table import BALL
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
-from foosim.world.kits.table import BALL
 from foosim.world.layout import WORLD
-from foosim.world.rules.football import kickoff_ticks
 from tests.simulation.conftest import TABLE, TICK_NS, TICKS, added_tick
 
 SECOND_NS = 1_000_000_000

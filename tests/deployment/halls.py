@@ -36,7 +36,7 @@ HEAD_LINES = HEAD.count("\n")
 POSE = "{kind: pose, rate: 5 Hz, offset: 0 s}"
 BATTERY = "{kind: battery, rate: 1 Hz, offset: 0 s}"
 ALL_ON_ONE = "nodes: {one: {robots: ['*']}}\n"
-PATROL = "foosim.players.warehouse_rover:Patrol"
+PATROL = "foosim.library.mobile.players.warehouse_rover:Patrol"
 
 ROVER = f"""\
 templates:

@@ -23,8 +23,8 @@ from foosim.deployment.text.expand import expand
 from foosim.deployment.text.includes import Source
 from foosim.deployment.text.selection import Population, Selector, TooManyComparisons
 from foosim.deployment.text.yaml import Fields, locate_in, plain, read_tree, write_yaml
+from foosim.library.mobile.rover import RoverRobot
 from foosim.world.layout import build_layout
-from foosim.world.models.rover import RoverRobot
 from tests.deployment.halls import BATTERY, HEAD, MADE, PATROL, PILOT, ROVER, TWO, WAREHOUSE, hall, problems_of
 from tests.kinematic_yard import yard_text
 

@@ -19,7 +19,7 @@ from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import read_files
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
-from foosim.world.clearance.table_clearance import clearance_findings
+from foosim.library.table.table_clearance import clearance_findings
 from foosim.world.matter.mesh import AssetError, digest_of
 from foosim.world.scene import Box
 from foosim.world.scenery import path_problem
@@ -179,7 +179,7 @@ def test_an_archive_is_not_unpacked(folder: Path) -> None:
 AUDIT: Final = """
 import os, sys
 from pathlib import Path
-import foosim.world.clearance.table_clearance, foosim.world.mesh_files  # else imported with the first mesh
+import foosim.library.table.table_clearance, foosim.world.mesh_files  # else imported with the first mesh
 from foosim.deployment.assets import pin_assets
 folder, opened, text = Path(sys.argv[1]), [], sys.stdin.read()
 def watch(event, given):

@@ -20,16 +20,16 @@ from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.launcher.liveness import WAITS_S
+from foosim.library.generic.gaussian_noise import GaussianNoiseSettings
+from foosim.library.table.ball import BallSettings
+from foosim.library.table.camera import CameraRobot
+from foosim.library.table.encoder import EncoderSettings
+from foosim.library.table.rod import RodRobot
+from foosim.library.table.settings import LINE_NAMES, TEAMS, table_of
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.world.forms.per_field import numbers_of, read_per_field
 from foosim.world.forms.registry import find, find_component, find_engine, find_model
 from foosim.world.forms.settings import ComponentSettings
-from foosim.world.models.camera import CameraRobot
-from foosim.world.models.rod import RodRobot
-from foosim.world.modifiers.gaussian_noise import GaussianNoiseSettings
-from foosim.world.parameters.table import LINE_NAMES, TEAMS, table_of
-from foosim.world.sensors.ball import BallSettings
-from foosim.world.sensors.encoder import EncoderSettings
 from tests.deployment.halls import BATTERY, PATROL, POSE, hall
 from tests.turns import BY_PERIOD
 
@@ -70,7 +70,11 @@ def test_the_table_has_eight_rods_a_camera_two_nodes_and_two_players(table: Depl
     assert table.endpoints() == sorted([*rods, "camera", "player-red", "player-blue"])
     for team in TEAMS:
         player = table.players[f"player-{team}"]
-        assert (player.class_, player.rate_hz, player.lockstep) == ("foosim.players.football:Team", Fraction(50), True)
+        assert (player.class_, player.rate_hz, player.lockstep) == (
+            "foosim.library.table.players.football:Team",
+            Fraction(50),
+            True,
+        )
         assert (player.act, player.arrivals) == ("arrival", {"camera": ["ball"]})
         assert player.robots == {f"{team}.{line}": ["encoder"] for line in LINE_NAMES} | {"camera": ["ball"]}
         assert player.parameters == {"team": team}

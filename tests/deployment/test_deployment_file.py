@@ -64,7 +64,7 @@ nodes:
     robots: [red.goal, camera]
 players:
   keeper:
-    class: foosim.players.football:Team
+    class: foosim.library.table.players.football:Team
     rate: 100 Hz
     robots:
       red.goal: [encoder]
@@ -178,8 +178,7 @@ def test_all_problems_of_fields_come_at_once_in_the_files_order_then_all_between
     between = (5, "substeps: 3"), (29, "    robots: [red.gaol, camera]")
     assert problems_of(changed((3, "seed: x"), (6, "engine: bulet"), (46, "      los: 0.5 %"), *between)) == [
         "small.yaml:3:7: seed: not a whole number, 'x'",
-        "small.yaml:6:9: engine: unknown engine (there are: bullet, mujoco, pure, or any module:Class), 'bulet', "
-        "nearest is 'bullet'",
+        "small.yaml:6:9: engine: unknown engine (there are: bullet, mujoco, pure), 'bulet', nearest is 'bullet'",
         "small.yaml:46:7: network.links[0]: unknown key, 'los', nearest is 'loss'",
     ]
     assert problems_of(changed(*between)) == [

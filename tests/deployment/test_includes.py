@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from foosim.common import limits
-from foosim.common.errors import DeploymentError
+from foosim.common.errors import DeploymentError, show
 from foosim.common.finding import Finding
 from foosim.deployment.loader import apply_sets, load_deployment, load_network, refuse_findings, with_network
 from foosim.deployment.text.files import read_source_file
@@ -246,7 +246,7 @@ def test_later_findings_are_placed_in_the_included_file(files: Files) -> None:
     )
     with pytest.raises(DeploymentError) as error:
         refuse_findings(source, "f.yaml", [Finding(("players", "p", "class"), "no such class", PATROL)])
-    assert error.value.problems == (f"t.yaml:7:22: players.p.class: no such class, '{PATROL}'",)
+    assert error.value.problems == (f"t.yaml:7:22: players.p.class: no such class, {show(PATROL)}",)
 
 
 def test_a_plan_is_made_of_a_file_with_its_files(files: Files) -> None:

@@ -8,7 +8,7 @@ from foosim.common import limits
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.world.models.rod import RodRobot
+from foosim.library.table.rod import RodRobot
 
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 
@@ -82,8 +82,7 @@ def test_problems_of_the_file_and_of_all_settings_come_together() -> None:
     with pytest.raises(DeploymentError) as error:
         apply_sets(bad, "bad.yaml", ["seed=5", "tik=1 ms", "listen=10.0.0.1:70000"])
     assert error.value.problems[0] == (
-        f"bad.yaml:{line}:9: engine: unknown engine (there are: bullet, mujoco, pure, or any module:Class), 'bulet', "
-        "nearest is 'bullet'"
+        f"bad.yaml:{line}:9: engine: unknown engine (there are: bullet, mujoco, pure), 'bulet', nearest is 'bullet'"
     )
     assert [problem for problem in error.value.problems if problem.startswith("--set")] == [
         "--set:2:1: unknown key, 'tik', nearest is 'tick'",

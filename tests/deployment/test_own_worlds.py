@@ -348,7 +348,7 @@ def test_objects_have_names_of_their_own() -> None:
 
 
 def test_a_rod_by_its_class_is_a_rod() -> None:
-    rod = "{model: 'foosim.world.models.rod:Rod', team: red, line: goal}"
+    rod = "{model: 'foosim.library.table.rod:Rod', team: red, line: goal}"
     assert problems(f"robots.camera={rod}", "players={}") == [
         "robots.camera.line: red's line is already the rod red.goal, 'goal'"
     ]

@@ -14,9 +14,9 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema_text
 from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.settings import Table, places_between_lines, table_of
+from foosim.library.table.table_presets import PRESETS
 from foosim.simulation.run import rehearse
-from foosim.world.parameters.table import Table, places_between_lines, table_of
-from foosim.world.parameters.table_presets import PRESETS
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 SIZES: Final = {"german": (1.2, 0.68), "us": (1.168, 0.679), "small": (1.17, 0.631)}

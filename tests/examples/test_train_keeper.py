@@ -14,9 +14,9 @@ from typing import Any, Final
 import pytest
 
 from foosim.client.player import Sample
-from foosim.players.learning.exercises import TABLE
+from foosim.library.table.ball import BallPosition
+from foosim.library.table.learning.exercises import TABLE
 from foosim.simulation.simulation import read_for_stepping
-from foosim.world.sensors.ball import BallPosition
 
 EXAMPLES: Final = Path(__file__).parents[2] / "examples"
 SHORT: Final = ("--generations", "2", "--policies", "6", "--shots", "8", "--trials", "20", "--seed", "1", "--jobs", "2")

@@ -20,7 +20,7 @@ from foosim.deployment.text.files import read_source_file
 from foosim.fitting.estimate import fit, scatter_of
 from foosim.fitting.motion import Array, Field, Pairs, Start, motion
 from foosim.fitting.tracks import BadTracks, read_tracks, usable
-from foosim.world.parameters.table import Table, table_of
+from foosim.library.table.settings import Table, table_of
 from tests.conftest import Typed
 from tests.physics.conftest import World
 

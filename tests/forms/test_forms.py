@@ -22,7 +22,7 @@ from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
-from foosim.world.forms.registry import FORMS, own_module
+from foosim.world.forms.registry import FORMS
 from tests.forms.limits import Edge, edges
 from tests.forms.worlds import VARIANTS, WORLDS, World, changed_slots
 from tests.frames import Frames, broken_laws
@@ -44,7 +44,7 @@ EACH_ALONE: Final = pytest.mark.parametrize(
 @cache
 def own() -> list[tuple[str, str]]:
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    return sorted((form.type_name, form.name) for form in found if form.module == own_module(form.type_name, form.name))
+    return sorted((form.type_name, form.name) for form in found if form.is_own)
 
 
 def test_every_form_has_a_world_of_its_own() -> None:

@@ -20,11 +20,11 @@ from foosim.launcher.display import (
     recovery_text,
     render_text,
 )
+from foosim.library.mobile.hall import HallKit
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.protocol.run_status import NO_PACKETS
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.settings import RunSettings
-from foosim.world.kits.hall import HallKit
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 HERE = {"host": "", "lost": False, "stopped": False}

@@ -63,8 +63,10 @@ def test_where_all_is_well_every_check_says_so(deployment: Deployment, folder: P
 def test_the_classes_of_players_are_imported_where_they_are_to_run(tmp_path: Path) -> None:
     hosts = "\nhosts:\n  arm:\n    address: 192.0.2.7\n"
     text = apart() + hosts
-    text = text.replace("class: foosim.players.football:Team", "class: own_team:Team\n    host: arm", 1)
-    text = text.replace("class: foosim.players.football:Team", "class: foosim.players.football:Teem", 1)
+    text = text.replace("class: foosim.library.table.players.football:Team", "class: own_team:Team\n    host: arm", 1)
+    text = text.replace(
+        "class: foosim.library.table.players.football:Team", "class: foosim.library.table.players.football:Teem", 1
+    )
     deployment = load_deployment(text, "table.yaml")
     here, there = Case(deployment, "127.0.0.1"), Case(deployment, "127.0.0.1", host="arm")
     (finding,) = [finding for finding in examine(here) if finding.check == "players"]

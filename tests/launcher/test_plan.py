@@ -18,10 +18,10 @@ from foosim.launcher.display import Display
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import Up
+from foosim.library.table.settings import table_of
 from foosim.runtime.run_folder import RunFolder
 from foosim.supervisor import main as supervisor_main
 from foosim.supervisor.settings import RunSettings
-from foosim.world.parameters.table import table_of
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 EVERYTHING = RunOptions(

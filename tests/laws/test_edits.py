@@ -14,6 +14,8 @@ from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import read_branch
 from foosim.common.errors import BadValue, DeploymentError, UnknownName
 from foosim.deployment.loader import load_deployment
+from foosim.library.generic.laser_scanner import Scan
+from foosim.library.mobile.battery import BatteryRule
 from foosim.runtime.roles.bus import Weather
 from foosim.simulation.run import rehearse
 from foosim.simulation.simulation import Simulation
@@ -22,9 +24,7 @@ from foosim.simulation.verify import verify_capture
 from foosim.world.assembly.event_times import events_by_tick
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.components.view import ComponentError
-from foosim.world.entity_rules.battery import Battery
 from foosim.world.frame import Frame
-from foosim.world.sensors.laser_scanner import Scan
 from foosim.world.setting.settable import set_edits
 from tests.kinematic_yard import yard_text
 
@@ -195,7 +195,7 @@ def state_of(simulation: Simulation) -> tuple[float, float, int]:
 def test_a_component_that_gives_no_numbers_of_its_slots_is_an_error_of_it(
     gives: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Battery, "set", lambda self, field, value: gives)
+    monkeypatch.setattr(BatteryRule, "set", lambda self, field, value: gives)
     deployment = load_deployment(text([]), NAME)
     frame = initial_frame(deployment)
     with pytest.raises(ComponentError, match="battery of k-1 failed"):

@@ -17,17 +17,17 @@ import pytest
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.rod import RodRobot, figure_ys
+from foosim.library.table.rod_voltage import VoltageActuator
+from foosim.library.table.settings import table_of
 from foosim.node.physics.bullet_engine import BulletEngine
 from foosim.node.physics.interface import Engine, EngineFactory
 from foosim.node.physics.pure_engine import PureEngine
-from foosim.world.actuators.rod_voltage import VoltageActuator
 from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import View
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.models.rod import RodRobot, figure_ys
-from foosim.world.parameters.table import table_of
 from foosim.world.scene import Body, Shape
 from tests.placing import place_ball
 

@@ -23,6 +23,7 @@ from foosim.common.errors import Malformed
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.settings import table_of
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
@@ -36,16 +37,16 @@ from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.vhub.state.records import Closing
-from foosim.world.assembly.islands import Assignment, Island, Reach, Share, islands_of, table_reach_of, touching_of
+from foosim.world.assembly.islands import Assignment, Share, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.rest import Rest
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.assembly.world import initial_numbers
+from foosim.world.components.reach import Island, Reach
 from foosim.world.edits import counters, parked
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, build_layout
-from foosim.world.parameters.table import table_of
 from tests.forms.test_forms import ALONE, own
 from tests.forms.worlds import DEPLOY, still
 from tests.frames import Frames

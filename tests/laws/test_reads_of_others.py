@@ -28,7 +28,7 @@ from tests.swarm.faults import PUSH_MAX
 
 NAME: Final = "others.yaml"
 READERS: Final = """
-from foosim.world.actuators.wheel_speeds import Drive, DriveActuator
+from foosim.library.mobile.wheel_speeds import Drive, DriveActuator
 from msgspec import Struct
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.forms.quantities import Metres

@@ -15,7 +15,7 @@ from foosim.common import limits
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets
 from foosim.deployment.schema import Deployment
-from foosim.players.football import Team
+from foosim.library.table.players.football import Team
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Deliveries, Go

@@ -11,6 +11,7 @@ import pytest
 
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.rod_position import PositionActuator
 from foosim.node.engines_pool import FINGERPRINT_TICKS
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.protocol.channels import PART
@@ -19,7 +20,6 @@ from foosim.protocol.messages import Part
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
-from foosim.world.actuators.rod_position import PositionActuator
 from foosim.world.layout import Entity, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.settings import table_of
 from foosim.node.physics.interface import Engine
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.layout import Layout, build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.scene import Vector
 from tests.placing import place_ball
 from tests.shared_engine import make_shared_engine

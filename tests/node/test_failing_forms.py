@@ -33,7 +33,7 @@ FORMS: Final = """
 import sys
 import numpy as np
 from msgspec import Struct
-from foosim.world.actuators.rod_position import Command, RodPositionSettings, PositionActuator
+from foosim.library.table.rod_position import Command, RodPositionSettings, PositionActuator
 from foosim.world.forms.quantities import Metres
 from foosim.world.components.base import EntityRule, Modifier, Rule, Sensor
 from foosim.world.forms.registry import actuator, modifier, rule, sensor

@@ -15,13 +15,13 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment.json_schema import deployment_schema
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.settings import table_of
 from foosim.simulation.run import rehearse
 from foosim.world.assembly import world
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms import registry
 from foosim.world.forms.forms import ENGINES
 from foosim.world.layout import build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.scene import Scene, Sphere, Vector
 from tests.placing import place_ball
 from tests.shared_engine import make_shared_engine

@@ -17,6 +17,7 @@ import pytest
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.launcher.outcome import Outcome
+from foosim.library.table.settings import table_of
 from foosim.node.physics.interface import Island
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
@@ -28,7 +29,6 @@ from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.parameters.table import table_of
 from tests.kinematic_yard import Yard, yard_text
 from tests.placing import place_ball
 

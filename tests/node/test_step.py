@@ -14,6 +14,7 @@ import pytest
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.settings import table_of
 from foosim.node.due_sensors import DueSensors
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
@@ -22,7 +23,6 @@ from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import Add, Edit, Push, Remove, Set, check_edits
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
 from tests.placing import added_ball, place_ball
 

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.settings import table_of
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import Entity, build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.scene import Vector, inertia_about_axis
 from tests.physics.test_rod_drives import Driven
 from tests.placing import place_ball

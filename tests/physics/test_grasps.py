@@ -13,15 +13,15 @@ from foosim.client.jobs import Jobs
 from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
+from foosim.library.rigid.gripper import GraspFailure, Grip
+from foosim.library.rigid.gripper_state import GripperState
 from foosim.simulation.simulation import Simulation
-from foosim.world.actuators.gripper import GraspFailure, Grip
 from foosim.world.assembly.volumes import Volumes
 from foosim.world.components.grasping import grasp_of
 from foosim.world.forms.jobs import JobState
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
-from foosim.world.sensors.rigid.gripper_state import GripperState
 from tests.forms.worlds import DEPLOY
 from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, porter, world
 

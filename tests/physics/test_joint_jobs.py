@@ -20,14 +20,14 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.rigid.joint_trajectory import JointTrajectory, TrajectoryFailure
+from foosim.library.rigid.spline import fastest, position_at
 from foosim.simulation.simulation import Simulation
-from foosim.world.actuators.joints.joint_trajectory import JointTrajectory, TrajectoryFailure
 from foosim.world.components.fitted import actuators_of
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component
 from foosim.world.layout import build_layout
-from foosim.world.moving.spline import fastest, position_at
 from tests.forms.worlds import DEPLOY
 from tests.heads import EYE_M, TILT_M, folder, head
 from tests.kinematic_yard import TICK_S, yard_text

@@ -16,11 +16,11 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.settings import table_of
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
 from foosim.world.scene import load_of
 from tests.placing import place_ball

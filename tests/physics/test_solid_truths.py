@@ -15,6 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
+from foosim.library.mobile.rotors import QuadrotorRobot
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.world.bodies.inertia import turned
@@ -23,7 +24,6 @@ from foosim.world.components.drives import NO_DRIVES, Drives, Motor
 from foosim.world.kinematics import forward_kinematics, twist
 from foosim.world.matter.mesh import Mesh
 from foosim.world.matter.physics import Side
-from foosim.world.parameters.rotors import QuadrotorRobot
 from foosim.world.scene import (
     ORIGIN,
     UPRIGHT,
@@ -343,9 +343,9 @@ PARTS: Final = "".join(
     for x, name in enumerate(("left", "reach", "right", "spare"))
 )
 OWN_SPIN: Final = """
-from foosim.world.actuators.joints.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
+from foosim.library.rigid.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
 from foosim.world.forms.registry import actuator
-from foosim.world.parameters.joints import set_points
+from foosim.library.rigid.joints import set_points
 
 class SpinSettings(JointVelocitySettings): pass
 

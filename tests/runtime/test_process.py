@@ -121,7 +121,7 @@ from foosim.node import main as node
 from foosim.vhub import main as vhub
 print([name for name in ("ssl", "cryptography", "foosim.capture.reader") if name in sys.modules])
 from foosim.deployment.schema import Deployment
-from foosim.world.parameters.table import Table
+from foosim.library.table.settings import Table
 from foosim.cli import control, up, verbs
 print([name for name in ("ssl", "cryptography") if name in sys.modules])
 print([model.__name__ for model in (Deployment, Table) if model.__pydantic_complete__])

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.mobile.set_points import MotionSetPoints
 from foosim.simulation.check.component_check import ComponentCheck, used_form
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.world.components.view import View
-from foosim.world.moving.asked import MotionSetPoints
 from tests.conftest import Command, Typed
 from tests.frames import Frames, broken_laws
 from tests.kinematic_yard import yard_text
@@ -217,8 +217,8 @@ def test_a_form_is_named_as_deployments_do() -> None:
     text = TABLE.read_text()
     assert used_form(text, TABLE.name, "encoder").type_name == "sensor"
     assert used_form(text, TABLE.name, "rule football").name == "football"
-    assert used_form(text, TABLE.name, "foosim.world.models.rod:Rod").type_name == "model"
-    assert used_form(text, TABLE.name, "model foosim.world.models.rod:Rod").type_name == "model"
+    assert used_form(text, TABLE.name, "foosim.library.table.rod:Rod").type_name == "model"
+    assert used_form(text, TABLE.name, "model foosim.library.table.rod:Rod").type_name == "model"
 
 
 WRONG: Final = {
@@ -226,7 +226,7 @@ WRONG: Final = {
     "gaussian_noise, rod, rod_position, table), 'encodr', nearest is 'encoder'",
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
-    "foosim.world.models.rod:Rot": "nearest is 'foosim.world.models.rod:Rod'",
+    "foosim.library.table.rod:Rot": "nearest is 'foosim.library.table.rod:Rod'",
     "own_gone:Own": "no module own_gone (it is neither beside the deployment nor on PYTHONPATH), 'own_gone:Own'",
 }
 
@@ -251,7 +251,7 @@ def test_a_name_of_several_forms_says_which(planted: Path) -> None:
 
 def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
     """Wherever it was imported from, in the deployment and in the question."""
-    (planted / "mine.py").write_text("from foosim.world.sensors.encoder import Encoder as Mine\n")
+    (planted / "mine.py").write_text("from foosim.library.table.encoder import Encoder as Mine\n")
     text = apply_sets(TABLE.read_text(), TABLE.name, ["robots.red.goal.sensors.encoder.kind=mine:Mine"])
     assert used_form(text, TABLE.name, "mine:Mine").name == "encoder"
     assert used_form(TABLE.read_text(), TABLE.name, "sensor mine:Mine").name == "encoder"

@@ -18,8 +18,8 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 from foosim.capture.start_frame import BadBranch
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
-from foosim.players.learning.exercises import ENVIRONMENTS
-from foosim.players.learning.table_rewards import DefendShot, Goals, score_of, with_ball
+from foosim.library.table.learning.exercises import ENVIRONMENTS
+from foosim.library.table.learning.table_rewards import DefendShot, Goals, score_of, with_ball
 from foosim.simulation.env import FoosimEnv, FoosimParallelEnv, parallel_env
 from foosim.simulation.run import rehearse
 from foosim.simulation.simulation import Simulation, read_for_stepping

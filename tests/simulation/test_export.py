@@ -22,7 +22,7 @@ from foosim.capture.tables import table_names, table_of
 from foosim.common.errors import BadValue, Failed
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.actuators.rod_position import Command
+from foosim.library.table.rod_position import Command
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component
 from tests.own_forms import folder_on_path, written

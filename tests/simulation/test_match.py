@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.players import OF_THE_TABLE
+from foosim.library.table.players import OF_THE_TABLE
 from foosim.simulation.match.figures import chance, draw, figures, mean, rate, share, t_quantile
 from foosim.simulation.match.game import Fixture, Game, Link, Played, play, points_of, sets_of
 

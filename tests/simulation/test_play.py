@@ -28,6 +28,7 @@ from foosim.client.replay_listener import Replay, ReplayGone, ReplayRefused, hea
 from foosim.common.errors import BadValue
 from foosim.common.units import Pace
 from foosim.launcher import pki as certificates
+from foosim.library.table.ball import BallPosition
 from foosim.protocol.replay_messages import (
     Played,
     PlayedLine,
@@ -42,7 +43,6 @@ from foosim.runtime.transport.certificates import load_credentials
 from foosim.simulation.play.main import PlayOptions, PlayResult, Stopper, play_capture
 from foosim.simulation.play.terminal import Lines
 from foosim.simulation.run import rehearse
-from foosim.world.sensors.ball import BallPosition
 from tests.simulation.conftest import TABLE, TICK_NS, TICKS, damaged, replay
 
 MS = 1_000_000

@@ -16,6 +16,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import Scan, deployment_of, open_capture, read_about
 from foosim.capture.rows import PacketRow
 from foosim.common.errors import BadValue
+from foosim.library.table.settings import LINE_NAMES
 from foosim.protocol.codec import decode
 from foosim.protocol.replay_messages import (
     LOG,
@@ -32,7 +33,6 @@ from foosim.protocol.replay_messages import (
 from foosim.simulation.play.core import Span
 from foosim.simulation.play.entries import Entries, Entry, Selection, make_selection
 from foosim.simulation.play.main import entries_at, read_span
-from foosim.world.parameters.table import LINE_NAMES
 from tests.simulation.conftest import TICK_NS, TICKS, damaged, messages_of, rewritten, with_row
 
 MS = 1_000_000

@@ -15,13 +15,13 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.validate_network import BadEvent
-from foosim.players.learning.table_rewards import with_ball
+from foosim.library.table.learning.table_rewards import with_ball
+from foosim.library.table.rod_position import Command
 from foosim.protocol.messages import Received
 from foosim.simulation.agents import LEARNER
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.simulation import Simulation, read_for_stepping
 from foosim.simulation.stepped_world import SteppedWorld
-from foosim.world.actuators.rod_position import Command
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.robot_packets import Delivered
 from tests.waving import PERFECT, PERIOD, PLAYERS, waved

@@ -27,8 +27,8 @@ from foosim.simulation.settings import Clock, Traced
 from foosim.simulation.stepped_world import SteppedWorld
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
-from foosim.world.actuators.gripper import GripperSettings
 from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.components.grasping import GripperSettings
 from foosim.world.frame import Frame
 from tests.swarm.faults import (
     CHANGES_THE_WORLD,

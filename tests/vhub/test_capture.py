@@ -23,11 +23,11 @@ from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import ROW_TYPES, EpochRow, OwnerRow, json_schema
+from foosim.library.table.settings import table_of
 from foosim.vhub.recording.model_hash import model_hash
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import CHAIN_START, chain_next
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.parameters.table import table_of
 from tests.vhub.conftest import RECOVERED, noise
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ import pybullet as p
 import pytest
 
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.settings import table_of
 from foosim.vhub.line_of_sight.occlusion import Crossing, Geometry, Sight, Trace
 from foosim.vhub.line_of_sight.placement import World
 from foosim.world.assembly.world import initial_numbers
@@ -22,7 +23,6 @@ from foosim.world.layout import Declared, Layout, build_layout
 from foosim.world.matter.materials import METAL, PLASTIC, UNKNOWN, WOOD, RadioMaterial
 from foosim.world.matter.mesh import Mesh
 from foosim.world.mesh_files import read_mesh
-from foosim.world.parameters.table import table_of
 from foosim.world.scene import (
     UPRIGHT,
     Body,

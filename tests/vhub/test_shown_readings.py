@@ -17,12 +17,12 @@ from mcap_protobuf.decoder import DecoderFactory
 from foosim.capture.cut import cut_capture
 from foosim.capture.export import export_capture
 from foosim.capture.reader import CaptureData, open_capture
+from foosim.library.generic.laser_scanner import LaserScannerSettings, directions
 from foosim.simulation.run import rehearse
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component
-from foosim.world.sensors.laser_scanner import LaserScannerSettings, directions
 from tests.own_forms import TABLE, folder_on_path, written
 
 SETS: Final = (

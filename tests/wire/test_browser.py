@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 
 WAREHOUSE = Path(__file__).parent.parent.parent / "deploy" / "warehouse.yaml"
 ROBOTS = {f"red.{line}": ["encoder"] for line in ("goal", "defence", "midfield", "attack")} | {"camera": ["ball"]}
-PLAYER = {"class": "foosim.players.football:Team", "rate": "50 Hz", "robots": ROBOTS, "parameters": {"team": "red"}}
+PLAYER = {
+    "class": "foosim.library.table.players.football:Team",
+    "rate": "50 Hz",
+    "robots": ROBOTS,
+    "parameters": {"team": "red"},
+}
 LINK = ("camera", "player-red")
 STAT = "window.foosim.stat"
 WINDOW = 860, 480

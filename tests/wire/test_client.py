@@ -10,7 +10,7 @@ from foosim.client import control
 from foosim.client.client import connect
 from foosim.client.errors import ConnectionFailed, ConnectionRefused, NotJoined, RunEnded
 from foosim.common.errors import BadValue, UnknownName
-from foosim.world.sensors.encoder import RodPosition
+from foosim.library.table.encoder import RodPosition
 from tests.wire.conftest import ONE
 
 if TYPE_CHECKING:

@@ -20,6 +20,7 @@ from foosim.capture.rows import PacketRow
 from foosim.client import control
 from foosim.client.control import Control, RequestRefused
 from foosim.deployment.loader import load_deployment
+from foosim.library.table.settings import LINE_NAMES, TEAMS
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
@@ -28,7 +29,6 @@ from foosim.runtime.transport.inbox import Inbox
 from foosim.simulation.verify import verify_capture
 from foosim.world.frame import frame_from_bytes
 from foosim.world.layout import build_layout
-from foosim.world.parameters.table import LINE_NAMES, TEAMS
 from tests.wire.conftest import LIMIT_S, LONG, NO_CAPTURE_TO_CLOSE, in_process
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def test_a_second_ctrl_c_kills_everything(house: House) -> None:
 TRIPS = """
 from pathlib import Path
 
-from foosim.players.football import Team
+from foosim.library.table.players.football import Team
 
 class Trips(Team):
     def __init__(self, deployment, parameters):

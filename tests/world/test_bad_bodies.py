@@ -146,6 +146,8 @@ def test_an_engine_that_does_not_have_such_bodies(tmp_path: Path) -> None:
     text = yard_text({"base": {"model": "differential_drive"}}, engine="pure", objects={"crate": box})
     with pytest.raises(Refused) as refused:
         pin_assets(text, "yard.yaml", tmp_path)
-    what = "engine: the engine solves rods and balls of a table; objects.crate is a box, 'pure', nearest is 'mujoco'"
+    what = (
+        "engine: engine 'pure' supports only table rods and balls; objects.crate is a box: set engine: mujoco, 'pure'"
+    )
     assert str(refused.value).endswith(what)
     pin_assets(text.replace("engine: pure", "engine: mujoco"), "yard.yaml", tmp_path)

@@ -9,11 +9,11 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
+from foosim.library.mobile.hall_settings import hall_of
 from foosim.world.assembly.world import WorldMarks
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
 from foosim.world.frame import Frame
-from foosim.world.parameters.hall import hall_of
 from tests.deployment.halls import hall, problems_of
 from tests.kinematic_yard import TICK_S, Yard, yard_text
 

@@ -7,6 +7,7 @@ from math import inf, nan
 import pytest
 from msgspec import Struct
 
+from foosim.world.components.base import Actuator
 from foosim.world.components.bounds import CommandBounds
 from foosim.world.forms.payloads import PayloadCodec
 
@@ -22,7 +23,7 @@ class Mixed(Struct, frozen=True):
     speeds: tuple[float, ...]
 
 
-class Limited:
+class Limited(Actuator):
     def __init__(self, **limits: tuple[float, float]) -> None:
         self._limits = limits
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.settings import table_of
 from foosim.protocol.barrier import edits_content, input_digest_of
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Order
@@ -23,7 +24,6 @@ from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits, write, written
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
 from foosim.world.layout import build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Outbox
 from tests.placing import added_ball
 

@@ -229,7 +229,7 @@ def test_it_stops_at_rigid_bodies_and_leaves_one_that_was_pushed_into_it() -> No
         ),
         (
             {"r": {"model": "holonomic", "at": {"roll": "3 deg"}}},
-            "robots.r.at: an upright entity has no roll",
+            "robots.r.at: an upright body has no roll",
         ),
         (
             {"r": {"model": "mover", "radius": "1 m", "path": [{}, {"x": "1 m"}], "speed": "1 m/s"}},

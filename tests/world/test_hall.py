@@ -12,10 +12,10 @@ import pytest
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.processes import processes_of
+from foosim.library.mobile.hall_obstacles import obstacles_of, start_findings
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
-from foosim.world.clearance.hall_obstacles import obstacles_of, start_findings
 from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits
 from foosim.world.forms.registry import names
 from foosim.world.kinematics import forward_kinematics
@@ -125,7 +125,6 @@ def test_a_process_has_its_players_on_one_host() -> None:
 def test_robots_of_a_kit_need_its_section() -> None:
     neither = problems(WAREHOUSE.replace("\nhall:\n", "\nhal:\n"))
     assert "unknown key, 'hal', nearest is 'hall'" in neither
-    assert "robots.base.model: a robot of a hall in a world without one, 'station'" in neither
     rover = "{model: rover, x: 0 m, y: 0 m, sensors: {}}"
     assert "robots.camera.model: a robot of a hall in a world without one, 'rover'" in problems(
         TABLE, f"robots.camera={rover}"

@@ -364,7 +364,7 @@ def test_what_can_be_set_is_told() -> None:
             ("breeze: {kind: wind, x: 5 m/s}", "breeze: {kind: wind}\n  gale: {kind: wind}"),
             "a second wind beside breeze",
         ),
-        (("seed: 1\n", "seed: 1\nengine: pure\n"), "the engine has no air"),
+        (("seed: 1\n", "seed: 1\nengine: pure\n"), "engine 'pure' has no air"),
     ],
 )
 def test_what_cannot_be_is_refused(change: tuple[str, str], why: str) -> None:

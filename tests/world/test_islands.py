@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.rod import RodRobot
+from foosim.library.table.settings import table_of
 from foosim.world.assembly.islands import Assignment, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms.forms import ABSENT
 from foosim.world.layout import Layout, build_layout
-from foosim.world.models.rod import RodRobot
-from foosim.world.parameters.table import table_of
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)

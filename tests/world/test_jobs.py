@@ -13,17 +13,17 @@ from msgspec import Meta, Struct
 from foosim.client.player import Packet, Player
 from foosim.common.errors import DeploymentError, Refused
 from foosim.deployment.loader import load_deployment
+from foosim.library.mobile.go_to import Place
+from foosim.library.mobile.waypoint import Waypoint
 from foosim.simulation.simulation import Simulation
-from foosim.world.actuators.go_to import Place
-from foosim.world.actuators.waypoint import Waypoint
 from foosim.world.components.base import Actuator
+from foosim.world.components.job_reading import Jobs
 from foosim.world.forms import registry
 from foosim.world.forms.jobs import JobState
 from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.forms.quantities import JobNumber, Metres
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
-from foosim.world.sensors.job import Jobs
 from tests.kinematic_yard import yard_text
 
 NAME: Final = "yard.yaml"
@@ -271,8 +271,8 @@ def test_with_feelers_it_goes_round_what_is_in_its_way(model: str) -> None:
     [
         ({"sensors": {"jobs": {"kind": "job", "actuator": "og", "rate": "1 Hz"}}}, "there are go, 'og'"),
         ({"actuators": {"go": {"kind": "x_y_w"}}}, "no such actuator with jobs; there are none"),
-        ({"model": "rotorcraft"}, "valid are robots on two wheels and of the model holonomic"),
-        ({"model": "station"}, "go_to"),
+        ({"model": "rotorcraft"}, "it moves robots on two wheels, and those of the model holonomic"),
+        ({"model": "station", "x": "0 m", "y": "0 m"}, "go_to"),
     ],
 )
 def test_what_does_no_jobs_is_refused(robot: dict[str, Any], text: str) -> None:

@@ -7,14 +7,14 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.world.actuators.v_w import Motion
-from foosim.world.actuators.waypoint import Waypoint
-from foosim.world.actuators.wheel_speeds import Drive
-from foosim.world.actuators.x_y_w import Velocity
+from foosim.library.mobile.v_w import Motion
+from foosim.library.mobile.waypoint import Waypoint
+from foosim.library.mobile.wheel_speeds import Drive
+from foosim.library.mobile.wheels import slips_of, wheels_of
+from foosim.library.mobile.x_y_w import Velocity
 from foosim.world.assembly.world import TOGETHER_MIN
 from foosim.world.components.fitted import actuators_of, sensors_of
 from foosim.world.components.view import ComponentError, View, WritableView, has_together
-from foosim.world.moving.wheels import slips_of, wheels_of
 from tests.kinematic_yard import TICK_S, Yard, drawn, yard_text
 
 QUICK: Final = {"acceleration": "100 m/s2"}

@@ -19,47 +19,47 @@ from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.world.actuators.force import Push
-from foosim.world.actuators.go_to import Place
-from foosim.world.actuators.gripper import Grip
-from foosim.world.actuators.joints.joint_position import JointPositions
-from foosim.world.actuators.joints.joint_torque import JointEfforts
-from foosim.world.actuators.joints.joint_trajectory import Trajectory
-from foosim.world.actuators.joints.joint_velocity import JointVelocities
-from foosim.world.actuators.joints.look_at import Sight
-from foosim.world.actuators.joints.pan_tilt import PanTiltAngles
-from foosim.world.actuators.rod_force import RodForce
-from foosim.world.actuators.rod_position import Command
-from foosim.world.actuators.rod_velocity import RodVelocity
-from foosim.world.actuators.rod_voltage import RodVoltages
-from foosim.world.actuators.rotor_speeds import RotorSpeeds
-from foosim.world.actuators.v_w import Motion
-from foosim.world.actuators.waypoint import Waypoint
-from foosim.world.actuators.wheel_speeds import Drive
-from foosim.world.actuators.x_y_w import Velocity as Base
+from foosim.library.generic.gps import GlobalPosition
+from foosim.library.generic.imu import Inertial
+from foosim.library.generic.laser_scanner import Scan
+from foosim.library.generic.pose import Pose
+from foosim.library.generic.pose_3d import Pose3d
+from foosim.library.generic.proximity import Ranges
+from foosim.library.generic.range import Distance
+from foosim.library.generic.thermometer import Temperature
+from foosim.library.generic.velocity import Velocity
+from foosim.library.mobile.battery import Battery
+from foosim.library.mobile.go_to import Place
+from foosim.library.mobile.odometry import WheelTravel
+from foosim.library.mobile.rotor_speeds import RotorSpeeds
+from foosim.library.mobile.v_w import Motion
+from foosim.library.mobile.waypoint import Waypoint
+from foosim.library.mobile.wheel_speeds import Drive
+from foosim.library.mobile.x_y_w import Velocity as Base
+from foosim.library.rigid.contact import Touches
+from foosim.library.rigid.force import Push
+from foosim.library.rigid.gripper import Grip
+from foosim.library.rigid.gripper_state import GripperState
+from foosim.library.rigid.joint_position import JointPositions
+from foosim.library.rigid.joint_state import JointState
+from foosim.library.rigid.joint_torque import JointEfforts
+from foosim.library.rigid.joint_trajectory import Trajectory
+from foosim.library.rigid.joint_velocity import JointVelocities
+from foosim.library.rigid.look_at import Sight
+from foosim.library.rigid.pan_tilt import PanTiltAngles
+from foosim.library.table.ball import BallPosition
+from foosim.library.table.ball_state import BallState
+from foosim.library.table.encoder import RodPosition
+from foosim.library.table.figure_contact import FigureTouches
+from foosim.library.table.motor_current import Currents
+from foosim.library.table.rod_force import RodForce
+from foosim.library.table.rod_position import Command
+from foosim.library.table.rod_velocity import RodVelocity
+from foosim.library.table.rod_voltage import RodVoltages
+from foosim.world.components.job_reading import Jobs
 from foosim.world.forms.payloads import PayloadCodec, field_at
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component, names
-from foosim.world.sensors.ball import BallPosition
-from foosim.world.sensors.battery import Battery
-from foosim.world.sensors.encoder import RodPosition
-from foosim.world.sensors.gps import GlobalPosition
-from foosim.world.sensors.imu import Inertial
-from foosim.world.sensors.job import Jobs
-from foosim.world.sensors.joint_state import JointState
-from foosim.world.sensors.laser_scanner import Scan
-from foosim.world.sensors.odometry import WheelTravel
-from foosim.world.sensors.pose import Pose
-from foosim.world.sensors.pose_3d import Pose3d
-from foosim.world.sensors.proximity import Ranges
-from foosim.world.sensors.range import Distance
-from foosim.world.sensors.rigid.contact import Touches
-from foosim.world.sensors.rigid.gripper_state import GripperState
-from foosim.world.sensors.table.ball_state import BallState
-from foosim.world.sensors.table.figure_contact import FigureTouches
-from foosim.world.sensors.table.motor_current import Currents
-from foosim.world.sensors.thermometer import Temperature
-from foosim.world.sensors.velocity import Velocity
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 
 from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
+from foosim.library.table.rod_position import ANGLE_RAD_MAX, Command, PositionActuator
+from foosim.library.table.settings import table_of
 from foosim.node.tick import Stepper
-from foosim.world.actuators.rod_position import ANGLE_RAD_MAX, Command, PositionActuator
 from foosim.world.assembly.world import body_of, initial_numbers
 from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.components.view import View, WritableView
 from foosim.world.layout import build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import Delivered
 from foosim.world.scene import load_of
 

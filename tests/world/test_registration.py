@@ -206,11 +206,11 @@ for kind in ("own_broken:Own", "own_broken:Own"):
 print(json.dumps([find("sensor", "encoder").module, find("sensor", "own").module, told]))
 """
     written(site, "sensor('own', Settings, Number)(Own)")
-    broken = ("import foosim.world.sensors.encoder", "import own_form", "class Other(Own): pass",
+    broken = ("import foosim.library.table.encoder", "import own_form", "class Other(Own): pass",
               "sensor('other', Settings, Number)(Other)", "raise RuntimeError('at import')")  # fmt: skip
     written(site, *broken, name="own_broken")
     encoder, own, told = fresh(code, site)
-    assert (encoder, own) == ("foosim.world.sensors.encoder", "own_form")
+    assert (encoder, own) == ("foosim.library.table.encoder", "own_form")
     assert told.startswith("cannot be imported: RuntimeError: at import (own_broken.py:")
 
 

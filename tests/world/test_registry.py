@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
-from importlib import import_module
 from math import nan, pi
 from pathlib import Path
 from typing import Any, Final
@@ -26,7 +25,7 @@ from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings
 from foosim.world.forms import registry
 from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import FOLDERS, FORMS, find, find_component, names, own_module
+from foosim.world.forms.registry import FORMS, find, find_component, names
 from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -245,11 +244,9 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_each_stands_in_a_module_of_its_name_and_says_what_it_is(form: str) -> None:
-    folder = Path(str(import_module(FOLDERS[form]).__file__)).parent
-    assert names(form) == sorted(path.stem for path in folder.rglob("*.py") if path.stem != "__init__")
     for name in names(form):
         component = find(form, name)
-        assert (component.type_name, component.name, component.module) == (form, name, own_module(form, name))
+        assert (component.type_name, component.name, component.module.rpartition(".")[2]) == (form, name, name)
         assert component.summary.endswith(".")
         assert find(form, f"{component.module}:{component.factory.__qualname__}") is component
 
@@ -258,10 +255,10 @@ def test_finding_one_imports_its_module_only() -> None:
     """A node of a table does not import what rovers have."""
     code = """
 found = find("sensor", "encoder").module
-folders = ("foosim.world.sensors.", "foosim.world.actuators.")
-print(json.dumps([found, [name for name in sys.modules if name.startswith(folders)], "numpy" in sys.modules]))
+modules = [name for name in sys.modules if name.count(".") == 3 and name.startswith("foosim.library.")]
+print(json.dumps([found, modules, "numpy" in sys.modules]))
 """
-    assert fresh(code) == ["foosim.world.sensors.encoder", ["foosim.world.sensors.encoder"], False]
+    assert fresh(code) == ["foosim.library.table.encoder", ["foosim.library.table.encoder"], False]
 
 
 @pytest.mark.parametrize(
@@ -362,9 +359,9 @@ def test_a_name_of_foosims_own_is_not_taken_whichever_comes_first(site: Path, fi
     (site / "own_thief.py").write_text(THIEF)
     second = {"encoder": "own_thief:ReachGauge", "own_thief:ReachGauge": "encoder"}[first]
     told = fresh(f'print(json.dumps([said("sensor", {first!r}), said("sensor", {second!r})]))', site)
-    both = ("own_thief", "foosim.world.sensors.encoder")
+    both = ("own_thief", "foosim.library.table.encoder")
     assert any(all(word in text for word in both) for text in told), told
-    assert fresh('print(json.dumps(said("sensor", "encoder")))', site) == "foosim.world.sensors.encoder"
+    assert fresh('print(json.dumps(said("sensor", "encoder")))', site) == "foosim.library.table.encoder"
 
 
 def test_a_package_that_takes_a_name_of_foosims_own_hurts_nobody_else(site: Path) -> None:
@@ -375,9 +372,9 @@ told = [said("sensor", kind) for kind in ("encodr", "encoder", "pose")]
 print(json.dumps([told, names("sensor")]))
 """
     (unknown, encoder, pose), there = fresh(code, site)
-    assert (encoder, pose) == ("foosim.world.sensors.encoder", "foosim.world.sensors.pose")
+    assert (encoder, pose) == ("foosim.library.table.encoder", "foosim.library.generic.pose")
     assert unknown.startswith("UnknownName: unknown sensor") and unknown.endswith("'encodr', nearest is 'encoder'")
-    assert all(word in unknown for word in ("own_thief of thief 1.2", "foosim.world.sensors.encoder"))
+    assert all(word in unknown for word in ("own_thief of thief 1.2", "foosim.library.table.encoder"))
     assert set(there) >= {"encoder", "pose"}
 
 
@@ -402,7 +399,7 @@ def test_a_package_gives_its_components_by_name(site: Path) -> None:
 def test_a_package_is_not_imported_for_what_is_foosims_own(site: Path) -> None:
     install(site, "gauges", "own_gauges")
     code = 'print(json.dumps([said("sensor", "encoder"), "own_gauges" in sys.modules]))'
-    assert fresh(code, site) == ["foosim.world.sensors.encoder", False]
+    assert fresh(code, site) == ["foosim.library.table.encoder", False]
 
 
 def test_the_schema_for_editors_has_what_is_installed(site: Path) -> None:

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.football import kickoff_ticks
+from foosim.library.table.settings import places_between_lines, table_of
 from foosim.world.assembly.world import initial_numbers, rules_of
 from foosim.world.components.view import WritableView
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
-from foosim.world.parameters.table import places_between_lines, table_of
-from foosim.world.rules.football import kickoff_ticks
 from tests.placing import place_ball
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()

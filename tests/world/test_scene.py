@@ -7,12 +7,12 @@ import pytest
 import yaml
 
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.rod import RodRobot
+from foosim.library.table.settings import table_of
 from foosim.world.assembly.islands import table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
-from foosim.world.models.rod import RodRobot
-from foosim.world.parameters.table import table_of
 from foosim.world.scene import Box, Shape, Vector, inertia_about_axis, multiply, place, rotate, swept_box, turn
 from tests.placing import place_ball
 

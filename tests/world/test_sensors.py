@@ -14,6 +14,7 @@ from foosim.common.batched.noise import NoiseKey
 from foosim.common.keyed_random import draw_key
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.library.table.settings import table_of
 from foosim.node.tick import Stepper
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import BoundSensor, sensors_of
@@ -21,7 +22,6 @@ from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
-from foosim.world.parameters.table import table_of
 from foosim.world.robot_packets import RobotPacket
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.library.table.settings import table_of
 from foosim.node.edited_frame import edit
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.surroundings import Surroundings
@@ -17,7 +18,6 @@ from foosim.world.edits import Remove
 from foosim.world.forms.forms import ENTITY, NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout, build_layout
-from foosim.world.parameters.table import table_of
 from tests.placing import added_ball
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

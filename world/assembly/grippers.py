@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from foosim.common.keyed_random import draw_key
-from foosim.world.actuators.gripper import GripperSettings
+from foosim.world.components.grasping import GripperSettings
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting
 from foosim.world.forms.forms import NO_ENTITY

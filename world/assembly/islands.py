@@ -10,52 +10,18 @@ comparisons, so that all CPUs agree.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.world.assembly.presence import Presence
 from foosim.world.assembly.volumes import BodyIsland, Volumes, solver_by_name
+from foosim.world.components.reach import Island, Reach
+from foosim.world.fixed_scenery import kits_of
 from foosim.world.layout import Layout
-from foosim.world.models.rod import RodRobot, line_x_m
-from foosim.world.parameters.table import TABLE, table_of
 from foosim.world.spec import WorldSpec
-
-MARGIN_M = 0.001
-"""Added to every bounding volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
-
-
-@dataclass(frozen=True)
-class Reach:
-    """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
-    with one half width and one band of z; `balls` are (index, start of the position); `alone` are the islands of what
-    touches nobody."""
-
-    ball_m: float
-    rods: tuple[tuple[int, str, float], ...]
-    axes: tuple[float, ...]
-    half_width_m: float
-    z_low_m: float
-    z_high_m: float
-    balls: tuple[tuple[int, int], ...]
-    alone: tuple[Island, ...] = ()
-
-    def without(self, absent: Collection[int]) -> Reach:
-        """Return those of all but some entities, by their indices."""
-        balls = tuple([ball for ball in self.balls if ball[0] not in absent])
-        alone = tuple([one for one in self.alone if one.entities[0] not in absent])
-        return replace(self, balls=balls, alone=alone)
-
-
-@dataclass(frozen=True)
-class Island:
-    """Indices of its entities, ascending, and the robot (its name) whose owner solves it; empty without one."""
-
-    entities: tuple[int, ...]
-    nearest: str
 
 
 @dataclass(frozen=True)
@@ -84,29 +50,9 @@ def table_reach_of(spec: WorldSpec, layout: Layout) -> Reach:
         for entity in layout.entities
         if entity.kind.motion is not None
     )
-    if TABLE not in spec.kits:
-        return Reach(0.0, (), (), 0.0, 0.0, 0.0, (), alone)
-    table = table_of(spec)
-    rod = table.rod
-    half = rod.foot.length / 2
-    corner = sqrt(rod.foot_radius * rod.foot_radius + half * half)
-    tick_s = spec.tick_ns / 1e9
-    rods = []
-    for entity in layout.of("rod"):
-        robot = spec.robots[entity.name]
-        assert isinstance(robot, RodRobot)
-        rods.append((entity.index, entity.name, line_x_m(spec, robot)))
-    rods.sort(key=lambda rod: (rod[2], rod[1]))
-    return Reach(
-        ball_m=table.ball.radius + table.ball.speed_limit * tick_s + MARGIN_M,
-        rods=tuple(rods),
-        axes=tuple(axis for _, _, axis in rods),
-        half_width_m=corner + MARGIN_M,
-        z_low_m=rod.axis_height - corner - MARGIN_M,
-        z_high_m=rod.axis_height + corner + MARGIN_M,
-        balls=tuple((entity.index, entity.offsets["position"]) for entity in layout.of("ball")),
-        alone=alone,
-    )
+    reaches = (kit.reach(layout) for _, kit in kits_of(spec))
+    found = next((reach for reach in reaches if reach is not None), Reach(0.0, (), (), 0.0, 0.0, 0.0, ()))
+    return replace(found, alone=alone)
 
 
 Near = tuple[int, int, str]

@@ -21,6 +21,7 @@ from foosim.world.bodies.urdf_links import LinkPart, materials_of, mesh_paths, r
 from foosim.world.bodies.xml_tree import Element, read_xml
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Quaternion, Shape, Vector, multiply, rotate
 
+SUFFIX: Final = ".urdf"
 SHAPES_MAX: Final = 256
 KEPT: Final = 32
 """Files whose robots are remembered."""

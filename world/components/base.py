@@ -15,9 +15,10 @@ from foosim.world.forms.jobs import JobState
 if TYPE_CHECKING:
     from foosim.common.finding import Finding
     from foosim.world.components.entities import Marked, MarkKind, Motors
+    from foosim.world.components.reach import Reach
     from foosim.world.components.view import View, WritableView
     from foosim.world.frame import Frame
-    from foosim.world.layout import Entity
+    from foosim.world.layout import Entity, Layout
     from foosim.world.matter.physics import Physics
     from foosim.world.scene import Body, Shape, Vector
 
@@ -280,6 +281,10 @@ class Kit:
 
     def physics(self) -> Physics | None:
         """Return what rigid bodies feel; None of a kit without any."""
+        return None
+
+    def reach(self, layout: Layout) -> Reach | None:
+        """Return the bounding volumes of its rods and balls; None of a kit without any."""
         return None
 
     def findings(self) -> Iterable[Finding]:

@@ -4,17 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from foosim.common import units
+from foosim.common.spec_base import default
+from foosim.common.units import Quantity
 from foosim.world.components.entities import mounting_of
+from foosim.world.forms.settings import ActuatorSettings, Tag
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout
+from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.clearing import distance_to
 from foosim.world.scene import Body, Quaternion, Vector, conjugate, moved, multiply, place, rotate, swept_box
 from foosim.world.spec import WorldSpec
 
+Reach = Annotated[float, Quantity(units.LENGTH, "1 mm", "2 m")]
+Opening = Annotated[float, Quantity(units.LENGTH, "1 mm", "10 m")]
+Load = Annotated[float, Quantity(units.MASS, "1 g", "100000 kg")]
 Grasp = tuple[Vector, Quaternion]
 """The pose of what is held, its centre of mass in its principal axes, in the frame of the link that holds it."""
+
+
+class GripperSettings(ActuatorSettings):
+    """Holds an object. `at` is the grip: a place on a link of the robot.
+
+    It takes an object whose surface is at most `reach` from the grip, whose least side is at most `opening`, and whose
+    mass is at most `mass`; with a `tag`, one that has it.
+    """
+
+    at: MountedAt = FIRST_LINK
+    reach: Reach = default("5 cm")
+    opening: Opening = default("50 cm")
+    mass: Load = default("10 kg")
+    tag: Tag | None = None
 
 
 class Portable(NamedTuple):

@@ -384,6 +384,11 @@ class Engine:
     islands: bool = False
     grasps: bool = False
 
+    @property
+    def bodies(self) -> str:
+        """The bodies that it supports, in words."""
+        return "bodies other than table rods and balls" if self.islands else "table rods and balls"
+
 
 ENGINES: Final[dict[str, Engine]] = {
     "bullet": Engine("bullet", "foosim.node.physics.bullet_engine:BulletEngine", meshes=True),

@@ -45,18 +45,9 @@ if TYPE_CHECKING:
     from foosim.world.forms.settings import EntitySettings
 
 GROUP: Final = "foosim.world"
-FOLDERS: Final[Mapping[str, str]] = {
-    "model": "foosim.world.models",
-    "sensor": "foosim.world.sensors",
-    "actuator": "foosim.world.actuators",
-    "modifier": "foosim.world.modifiers",
-    "rule": "foosim.world.rules",
-    "entity_rule": "foosim.world.entity_rules",
-    "scene": "foosim.world.scenes",
-    "kit": "foosim.world.kits",
-}
-"""Where foosim's own are, by form."""
-FORMS: Final = tuple(FOLDERS)
+LIBRARY: Final = "foosim.library"
+"""Where foosim's own are: each in a module of its name, in a folder for the kind of world."""
+FORMS: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit")
 BY_CLASS: Final = "module:Class"
 """What names a form beside its name."""
 
@@ -129,9 +120,8 @@ def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **a
         found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **about})
         check_form(found)
         key = form, name
-        own = own_module(*key)
-        if found.module != own and _is_there(*key):
-            raise Refused(f"{form} {name} is registered by {found.module}, and is in {own}")
+        if found.module != _own_modules().get(name):
+            _own(form, name)
         first = _known.setdefault(key, found)
         if (first.module, first.factory.__qualname__) != (found.module, made.__qualname__):
             raise Refused(f"{form} {name} is registered by {first.module} and {found.module}")
@@ -215,14 +205,14 @@ def find_model(kind: str) -> Model:
 
 def names(form: str) -> list[str]:
     """Return the names of all that are installed here, in name order: foosim's own, and those of other packages."""
-    for name in _own_modules(form):
-        _own(form, name)
+    for module in _own_modules().values():
+        import_module(module)
     load_entry_points()
     packages = {entry.module.partition(".")[0] for entry in _entry_points()}
     return sorted(
         name
         for (known, name), found in _known.items()
-        if known == form and (found.module == own_module(form, name) or found.module.partition(".")[0] in packages)
+        if known == form and (found.module == _own_modules().get(name) or found.module.partition(".")[0] in packages)
     )
 
 
@@ -257,33 +247,22 @@ def _load(entry: EntryPoint) -> str:
 
 def _own(form: str, name: str) -> ComponentType | None:
     """Return one of foosim's own, imported from its module; None where there is none."""
-    if _is_there(form, name):
-        import_module(own_module(form, name))
+    if name in _own_modules():
+        import_module(_own_modules()[name])
     return _known.get((form, name))
 
 
-def _is_there(form: str, name: str) -> bool:
-    """Whether foosim has a module of that name for a form."""
-    return name in _own_modules(form)
-
-
-def own_module(form: str, name: str) -> str:
-    """Return the module that one of foosim's own is in, or would be."""
-    return _own_modules(form).get(name, f"{FOLDERS[form]}.{name}")
-
-
 @cache
-def _own_modules(form: str) -> Mapping[str, str]:
-    """Return the modules of foosim's own forms by name: those of the form's folder, and of folders in that."""
-    folder = import_module(FOLDERS[form])
-    found: dict[str, str] = {}
-    for one in iter_modules(folder.__path__):
-        if one.ispkg:
-            inner = iter_modules([f"{path}/{one.name}" for path in folder.__path__])
-            found |= {its.name: f"{folder.__name__}.{one.name}.{its.name}" for its in inner}
-        else:
-            found[one.name] = f"{folder.__name__}.{one.name}"
-    return found
+def _own_modules() -> Mapping[str, str]:
+    """Return the modules of foosim's own component types by name."""
+    folders = import_module(LIBRARY).__path__
+    kinds = [kind.name for kind in iter_modules(folders) if kind.ispkg]
+    return {
+        module.name: f"{LIBRARY}.{kind}.{module.name}"
+        for kind in kinds
+        for module in iter_modules([f"{folder}/{kind}" for folder in folders])
+        if not module.ispkg
+    }
 
 
 def class_at(path: str) -> Any:

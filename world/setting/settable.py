@@ -30,8 +30,7 @@ from foosim.world.layout import (
     Layout,
     switches_of,
 )
-from foosim.world.parameters.vehicles import leaning
-from foosim.world.placing import At, is_placed
+from foosim.world.placing import At, is_placed, leaning
 from foosim.world.scene import Quaternion, Vector
 from foosim.world.setting.occupied import occupied_by
 from foosim.world.spec import WorldSpec

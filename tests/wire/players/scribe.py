@@ -8,7 +8,7 @@ from typing import Any
 
 from foosim.client.player import Commands, Samples
 from foosim.deployment.schema import Deployment
-from foosim.players.football import Team
+from foosim.library.table.players.football import Team
 
 
 class Scribe(Team):

@@ -1,0 +1,1 @@
+"""Components for any robot: sensors, modifiers, hazards, wind, zones."""

@@ -1,0 +1,1 @@
+"""Robots that move by kinematics or on wheels, the hall, batteries."""

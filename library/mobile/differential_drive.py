@@ -1,0 +1,223 @@
+"""A round robot on two driven wheels: moved by kinematics, or a rigid body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final
+
+import numpy as np
+
+from foosim.common.exact_math import atan2
+from foosim.library.mobile.arcs import Arcs, Floats, along_arcs, approached
+from foosim.library.mobile.differential import DifferentialDriveRobot, rigid_body
+from foosim.library.mobile.set_points import set_points_of
+from foosim.library.mobile.vehicles import body_of, is_in_reach, set_down, upright
+from foosim.library.mobile.wheels import WheelMotors, Wheels, slips_of, wheels_of
+from foosim.library.rigid.primitives import RIGID
+from foosim.world.components.base import Model, Motion
+from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.view import Mounting, Slot, WritableView
+from foosim.world.forms.forms import BODY, JOINTS
+from foosim.world.forms.registry import model
+from foosim.world.layout import Entity
+from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import FreeWay
+from foosim.world.moving.upright import Upright
+from foosim.world.scene import Body, Colour, moved, rotate
+
+BLUE: Final[Colour] = (0.15, 0.35, 0.75, 1.0)
+GREEN: Final[Colour] = (0.15, 0.55, 0.35, 1.0)
+WHEELS: Final = {"heading": 1, "wheel_speeds": 2, "wheel_travel": 2}
+"""The heading of a robot, the speeds of its rims, and how far its wheels have turned."""
+
+
+STATE: Final = (
+    "position",
+    "orientation",
+    "linear_velocity",
+    "angular_velocity",
+    "heading",
+    "wheel_speeds",
+    "wheel_travel",
+    "blocked",
+)
+"""The fields that this motion writes."""
+STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0))
+
+
+class _Batch:
+    """Robots that one node moves in a tick."""
+
+    def __init__(
+        self, way: FreeWay, state: EntityColumns, wheels: Mapping[int, Wheels], entities: Sequence[Entity]
+    ) -> None:
+        """`wheels` are by the entities' indices."""
+        self.entities = list(entities)
+        self.state = state.of(entities)
+        self.movers = way.movers(entities, is_level=True)
+        its = [wheels[entity.index] for entity in entities]
+        self.track = np.array([one.track for one in its])
+        self.rolls = np.array([[1.0 - one.slips[0], 1.0 - one.slips[1]] for one in its])
+
+
+class WheeledMotion(Motion):
+    """Along arcs, as far as nothing is in the way.
+
+    A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
+    From the speeds l and r of the wheels on the ground, v = (l + r) / 2 and w = (r - l) / track, a robot goes along an
+    arc (`moving.arcs`), as far as nothing is in the way (`moving.free_way`). It turns on the spot where all is
+    blocked, with its wheels slipping.
+    """
+
+    takes_arrays: ClassVar = True
+
+    def __init__(self, at: MotionMounting) -> None:
+        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
+        self._substeps = at.spec.substeps
+        self._way = FreeWay(at)
+        self._state = EntityColumns(at, STATE)
+        self._wheels = {entity.index: wheels_of(at.spec, at.layout, entity) for entity in at.entities}
+        self._batch = self._batch_of(at.entities)
+
+    def _batch_of(self, entities: Sequence[Entity]) -> _Batch:
+        return _Batch(self._way, self._state, self._wheels, entities)
+
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors] | Floats, view: WritableView) -> None:
+        """Advance these robots by a tick; of each wheel the target speed (m/s) and greatest acceleration (m/s2)."""
+        if self._batch.entities != entities:
+            self._batch = self._batch_of(entities)
+        batch, dt, count = self._batch, self._dt, len(entities)
+        state = batch.state.read_at_start(view)
+        place, heading = state[:, 0:3].copy(), state[:, 13].copy()
+        speeds, travel = state[:, 14:16].copy(), state[:, 16:18].copy()
+        set_points = set_points_of(motors, STANDING)
+        targets, rates = set_points[:, :, 0], set_points[:, :, 1]
+        near = self._way.near(batch.movers, view)
+        is_stopped = np.zeros(count, bool)
+        for _ in range(self._substeps):
+            speeds = approached(speeds, targets, rates * dt)
+            travel = travel + speeds * dt
+            ground = speeds * batch.rolls
+            ahead, turned = (ground[:, 0] + ground[:, 1]) / 2.0, (ground[:, 1] - ground[:, 0]) / batch.track * dt
+            ways = np.zeros((count, 3))
+            arcs = along_arcs(ahead * dt, 0.0, turned, heading)
+            ways[:, 0], ways[:, 1], heading = arcs.x, arcs.y, arcs.heading
+            place, shares, stops = near.free_way(place, ways)
+            is_stopped |= stops
+        _write(batch, view, place, arcs, ahead * shares, turned / dt, (speeds, travel, is_stopped))
+
+
+def _write(
+    batch: _Batch,
+    view: WritableView,
+    place: Floats,
+    arcs: Arcs,
+    ahead: Floats,
+    turn_rate: Floats,
+    rest: tuple[Floats, Floats, Floats],
+) -> None:
+    state = np.zeros((len(place), batch.state.width))
+    z, w = arcs.turn_z, arcs.turn_w
+    state[:, 0:3], state[:, 5], state[:, 6] = place, z, w
+    state[:, 7], state[:, 8] = ahead * (1.0 - 2.0 * z * z), ahead * (2.0 * z * w)
+    state[:, 12], state[:, 13] = turn_rate, arcs.heading
+    state[:, 14:16], state[:, 16:18], state[:, 18] = rest
+    batch.state.write(view, state)
+
+
+class RigidDifferentialDrive(Model):
+    """A round robot on two driven wheels, as a rigid body that stands on the floor.
+
+    `wheel_speeds` are rim speeds, `wheel_travel` is how far the wheels have turned at the rim, also where they slip.
+    """
+
+    def __init__(self, settings: DifferentialDriveRobot, at: Mounting) -> None:
+        self._settings, self._at = settings, at
+        self._orientation = at.slot("orientation").at
+        self._joints, self._rates = at.slot("joint_positions").at, at.slot("joint_velocities").at
+        first = at.slot("heading")
+        self._derived = Slot(first.at, sum(WHEELS.values()), f"{at.robot.name} {', '.join(WHEELS)}", first.is_own)
+        """The fields of `WHEELS`, which follow one another."""
+        self._tick_s = at.spec.tick_ns / 1e9
+        self._radius = settings.wheel_radius
+
+    def body(self) -> Body:
+        """Return hull, wheels and casters."""
+        return rigid_body(self._settings, self._at.robot.name, GREEN)
+
+    def wheels(self) -> Wheels:
+        """Return its wheels and their motors; their slip follows from friction."""
+        its = self._settings
+        motors = WheelMotors(its.wheel_radius, its.torque, self._rates, self._tick_s)
+        return Wheels(its.track, its.speed, its.acceleration, its.turn_rate, motors=motors)
+
+    def place(self, view: WritableView) -> None:
+        """Set it to its start, on its wheels, at rest."""
+        at, where = self._at, self._settings.at
+        set_down(at, where, view)
+        centre = rotate(where.orientation, (0.0, 0.0, self._settings.centre_height))
+        view.write(at.slot("position"), *moved(where.position, centre, 1.0))
+        view.write(at.slot("orientation"), *where.orientation)
+        view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
+
+    def derive(self, view: WritableView) -> None:
+        """Write the heading, which is where x of the hull is seen from above, and what the wheels do at their rims."""
+        numbers, at, radius = view.numbers, self._orientation, self._radius
+        x, y, z, w = numbers[at : at + 4]
+        heading = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        left, right = numbers[self._rates : self._rates + 2]
+        one, other = numbers[self._joints : self._joints + 2]
+        view.write(self._derived, heading, left * radius, right * radius, one * radius, other * radius)
+
+
+@model(
+    "differential_drive",
+    DifferentialDriveRobot,
+    slots={**BODY, **WHEELS, "blocked": 1},
+    motion=WheeledMotion,
+    actuators={"motion": {"kind": "v_w"}},
+    tags=("vehicle",),
+    units={"heading": ("rad",), "wheel_speeds": ("m/s",), "wheel_travel": ("m",)},
+    variants={
+        "rigid": {
+            "factory": RigidDifferentialDrive,
+            "slots": {**RIGID, **dict.fromkeys(JOINTS, 2), **WHEELS},
+            "is_rigid": True,
+            "motion": None,
+        }
+    },
+)
+class DifferentialDrive(Model):
+    """A round robot on two driven wheels.
+
+    `wheel_speeds` are rim speeds, `wheel_travel` is how far the wheels have turned, `blocked` whether an obstacle
+    stopped it in the tick.
+    """
+
+    def __init__(self, settings: DifferentialDriveRobot, at: Mounting) -> None:
+        self._settings, self._at = settings, at
+        self._position = at.slot("position").at
+        self._reach_m = settings.speed * at.spec.tick_ns / 1e9
+
+    def body(self) -> Body:
+        """Return the hull, a mark ahead, and the antenna's mast."""
+        settings = self._settings
+        return body_of(settings, self._at.robot.name, "differential_drive", BLUE, settings.speed)
+
+    def upright(self) -> Upright:
+        """Return its cylinder for obstacles."""
+        return upright(self._settings)
+
+    def wheels(self) -> Wheels:
+        """Return its wheels, which slip each by a share of its own."""
+        its = self._settings
+        slips = slips_of(self._at.spec, self._at.robot.name, its.slip)
+        return Wheels(its.track, its.speed, its.acceleration, its.turn_rate, slips)
+
+    def place(self, view: WritableView) -> None:
+        """Set it to its start, at rest."""
+        set_down(self._at, self._settings.at, view)
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether it is no farther away than its wheels can have taken it."""
+        return is_in_reach(numbers, before, self._position, self._reach_m)

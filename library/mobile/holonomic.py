@@ -1,0 +1,156 @@
+"""A round base that moves in any direction, as on omnidirectional wheels, moved by kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from foosim.common.spec_base import default
+from foosim.library.mobile.arcs import along_arcs, approached, approached_together
+from foosim.library.mobile.set_points import set_points_of
+from foosim.library.mobile.vehicles import (
+    Acceleration,
+    Speed,
+    TurnRate,
+    Vehicle,
+    body_of,
+    is_in_reach,
+    set_down,
+    upright,
+)
+from foosim.world.components.base import Model, Motion
+from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.view import Mounting, WritableView
+from foosim.world.forms.forms import BODY
+from foosim.world.forms.registry import model
+from foosim.world.layout import Entity
+from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import FreeWay
+from foosim.world.moving.upright import Upright
+from foosim.world.scene import Body, Colour
+
+TEAL: Final[Colour] = (0.10, 0.55, 0.55, 1.0)
+
+
+class HolonomicRobot(Vehicle):
+    """A round base that moves in any direction. Its usual actuator is `motion`, of the kind `x_y_w`.
+
+    `speed` and `acceleration` are the greatest in any direction, and `turn_rate` is how fast it turns at most; how fast
+    it turns changes by at most `acceleration` over `radius`, so that the rim has no more. The sizes are those of usual
+    research robots.
+    """
+
+    speed: Speed = default("1 m/s")
+    acceleration: Acceleration = default("1 m/s2")
+    turn_rate: TurnRate = default("180 deg/s")
+
+
+STATE: Final = (
+    "position",
+    "orientation",
+    "linear_velocity",
+    "angular_velocity",
+    "heading",
+    "base_velocity",
+    "blocked",
+)
+"""The fields that this motion writes."""
+STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+
+
+class _Batch:
+    """Bases that one node moves in a tick."""
+
+    def __init__(self, way: FreeWay, state: EntityColumns, entities: Sequence[Entity]) -> None:
+        self.entities = list(entities)
+        self.state = state.of(entities)
+        self.movers = way.movers(entities, is_level=True)
+
+
+class HolonomicMotion(Motion):
+    """In any direction, along arcs, as far as nothing is in the way.
+
+    The velocity in the base's own frame approaches its set-point: the vector in the plane with at most one
+    acceleration, the turning with another. With it the base moves along an arc (`moving.arcs`), as far as nothing is in
+    the way (`moving.free_way`); it turns where it is blocked.
+    """
+
+    def __init__(self, at: MotionMounting) -> None:
+        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
+        self._substeps = at.spec.substeps
+        self._way = FreeWay(at)
+        self._state = EntityColumns(at, STATE)
+        self._batch = _Batch(self._way, self._state, at.entities)
+
+    def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: WritableView) -> None:
+        """Advance these bases by a tick.
+
+        Motors are three: the speeds ahead and to the left (m/s), and turning left (rad/s), each with the greatest
+        acceleration (m/s2, rad/s2); that of the first holds for the vector of the first two.
+        """
+        if self._batch.entities != entities:
+            self._batch = _Batch(self._way, self._state, entities)
+        batch, dt, count = self._batch, self._dt, len(entities)
+        state = batch.state.read_at_start(view)
+        place, heading, velocity = state[:, 0:3].copy(), state[:, 13].copy(), state[:, 14:17].copy()
+        set_points = set_points_of(motors, STANDING)
+        targets, rates = set_points[:, :, 0], set_points[:, :, 1]
+        near = self._way.near(batch.movers, view)
+        is_stopped = np.zeros(count, bool)
+        for _ in range(self._substeps):
+            velocity[:, 0:2] = approached_together(velocity[:, 0:2], targets[:, 0:2], rates[:, 0] * dt)
+            velocity[:, 2] = approached(velocity[:, 2], targets[:, 2], rates[:, 2] * dt)
+            turned = velocity[:, 2] * dt
+            ways = np.zeros((count, 3))
+            arcs = along_arcs(velocity[:, 0] * dt, velocity[:, 1] * dt, turned, heading)
+            ways[:, 0], ways[:, 1], heading = arcs.x, arcs.y, arcs.heading
+            place, shares, stops = near.free_way(place, ways)
+            is_stopped |= stops
+        z, w = arcs.turn_z, arcs.turn_w
+        s, c = 2.0 * z * w, 1.0 - 2.0 * z * z
+        ahead, left = velocity[:, 0] * shares, velocity[:, 1] * shares
+        after = np.zeros((count, batch.state.width))
+        after[:, 0:3], after[:, 5], after[:, 6] = place, z, w
+        after[:, 7], after[:, 8] = ahead * c - left * s, ahead * s + left * c
+        after[:, 12], after[:, 13], after[:, 14:17], after[:, 17] = velocity[:, 2], heading, velocity, is_stopped
+        batch.state.write(view, after)
+
+
+@model(
+    "holonomic",
+    HolonomicRobot,
+    slots={**BODY, "heading": 1, "base_velocity": 3, "blocked": 1},
+    motion=HolonomicMotion,
+    actuators={"motion": {"kind": "x_y_w"}},
+    tags=("vehicle",),
+    units={"heading": ("rad",), "base_velocity": ("m/s", "m/s", "rad/s")},
+)
+class Holonomic(Model):
+    """A round base that moves in any direction.
+
+    `base_velocity` is what its wheels do, ahead, to the left and turning left; `blocked` whether an obstacle stopped it
+    in the tick.
+    """
+
+    def __init__(self, settings: HolonomicRobot, at: Mounting) -> None:
+        self._settings, self._at = settings, at
+        self._position = at.slot("position").at
+        self._reach_m = settings.speed * at.spec.tick_ns / 1e9
+
+    def body(self) -> Body:
+        """Return the hull, a mark ahead, and the antenna's mast."""
+        return body_of(self._settings, self._at.robot.name, "holonomic", TEAL, self._settings.speed)
+
+    def upright(self) -> Upright:
+        """Return its cylinder for obstacles."""
+        return upright(self._settings)
+
+    def place(self, view: WritableView) -> None:
+        """Set it to its start, at rest."""
+        set_down(self._at, self._settings.at, view)
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether it is no farther away than its speed allows."""
+        return is_in_reach(numbers, before, self._position, self._reach_m)

@@ -1,0 +1,1 @@
+"""Players of rovers and other mobile robots."""

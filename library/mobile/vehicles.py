@@ -1,0 +1,89 @@
+"""Robots that move by kinematics in any world: their quantities, and parts of their settings and bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Final
+
+from pydantic import AfterValidator
+
+from foosim.common import units
+from foosim.common.spec_base import default
+from foosim.common.units import Quantity, custom_error
+from foosim.library.mobile.hall_bodies import DARK, mast
+from foosim.world.components.view import Mounting, WritableView
+from foosim.world.forms.settings import RobotSettings
+from foosim.world.matter.materials import METAL, PLASTIC
+from foosim.world.matter.physics import DEFAULT
+from foosim.world.moving.upright import Upright
+from foosim.world.placing import ORIGIN_OF_WORLD, At, leaning
+from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, turn
+
+Radius = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 m")]
+Height = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 m")]
+Antenna = Annotated[float, Quantity(units.LENGTH, "0 m", "20 m")]
+Speed = Annotated[float, Quantity(units.SPEED, "1 mm/s", "50 m/s")]
+Acceleration = Annotated[float, Quantity(units.ACCELERATION, "1 mm/s2", "100 m/s2")]
+TurnRate = Annotated[float, Quantity(units.SPIN, "1 deg/s", "1000 deg/s")]
+Slip = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
+
+ROUNDING: Final = 1.000001
+"""A way is no longer than its speed allows, but for rounding."""
+HULL: Final = DEFAULT
+"""The surface of robots without rigid-body dynamics."""
+
+
+def _is_upright(at: At) -> At:
+    if problem := leaning(at):
+        raise custom_error(problem)
+    return at
+
+
+UprightAt = Annotated[At, AfterValidator(_is_upright)]
+
+
+class Vehicle(RobotSettings):
+    """A round robot that moves upright: where the middle of its underside starts, and how big it is.
+
+    It is a cylinder. The antenna is `antenna_height` above the underside, on a mast where that is above the hull.
+    """
+
+    at: UprightAt = ORIGIN_OF_WORLD
+    radius: Radius = default("25 cm")
+    height: Height = default("30 cm")
+    antenna_height: Antenna = default("35 cm")
+
+
+def upright(vehicle: Vehicle) -> Upright:
+    """Return its cylinder for obstacles: its hull, up to the top of its antenna."""
+    return Upright(vehicle.radius, 0.0, max(vehicle.height, vehicle.antenna_height))
+
+
+def body_of(vehicle: Vehicle, name: str, model: str, colour: Colour, speed_limit: float) -> Body:
+    """Return a round hull, a mark ahead on it, and the antenna's mast; it has no mass, since no engine moves it."""
+    radius, height = vehicle.radius, vehicle.height
+    hull = Shape(Cylinder(radius, height), HULL, colour, (0.0, 0.0, height / 2), radio=METAL)
+    shapes = (hull, mark_of(vehicle, HULL), *mast(height, vehicle.antenna_height, HULL))
+    link = Link(name, "free", shapes, 0.0, ORIGIN)
+    return Body(name, model, ORIGIN, (link,), (0.0, 0.0, vehicle.antenna_height), speed_limit)
+
+
+def mark_of(vehicle: Vehicle, surface: str) -> Shape:
+    """Return the mark on a hull that is ahead of its middle."""
+    radius, height = vehicle.radius, vehicle.height
+    mark = Box((radius / 4, radius / 8, height / 16))
+    return Shape(mark, surface, DARK, (radius / 2, 0.0, height + height / 16), radio=PLASTIC)
+
+
+def set_down(at: Mounting, where: At, view: WritableView) -> None:
+    """Set an entity to where it starts, at rest."""
+    view.write(at.slot("position"), *where.position)
+    view.write(at.slot("orientation"), *turn((0.0, 0.0, 1.0), where.yaw))
+    view.write(at.slot("heading"), where.yaw)
+
+
+def is_in_reach(numbers: Sequence[float], before: Sequence[float], at: int, reach_m: float) -> bool:
+    """Whether the place that begins at `at` is no farther from where it was than a reach (m), but for rounding."""
+    dx, dy, dz = numbers[at] - before[at], numbers[at + 1] - before[at + 1], numbers[at + 2] - before[at + 2]
+    reach = reach_m * ROUNDING
+    return dx * dx + dy * dy + dz * dz <= reach * reach

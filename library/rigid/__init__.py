@@ -1,0 +1,1 @@
+"""Rigid bodies of any kind: primitives, URDF, joints, grippers."""

@@ -1,1 +1,0 @@
-"""Actuators: one file each, which has its settings, its command, and its registration (`world.forms.registry`)."""

@@ -1,1 +1,0 @@
-"""Actuators of the joints of a robot."""

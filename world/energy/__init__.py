@@ -1,1 +1,0 @@
-"""Energy of robots: batteries and chargers."""

@@ -1,1 +1,0 @@
-"""Sections of a deployment that make a world from few numbers: table and hall."""

@@ -1,1 +1,0 @@
-"""Models of hazards to robots: fires, doors."""

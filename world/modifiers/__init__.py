@@ -1,1 +1,0 @@
-"""Modifiers of readings and commands: one file each, with settings and registration (`world.forms.registry`)."""

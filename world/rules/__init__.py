@@ -1,1 +1,0 @@
-"""Rules of worlds: events before a tick is solved, one file each."""

@@ -1,1 +1,0 @@
-"""Scenes: functions of settings that return scenery, one file each."""

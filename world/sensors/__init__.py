@@ -1,1 +1,0 @@
-"""Sensors: one file each, which has its settings, its reading, and its registration (`world.forms.registry`)."""

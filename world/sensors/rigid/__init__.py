@@ -1,1 +1,0 @@
-"""Sensors of rigid bodies: touches and grasps."""

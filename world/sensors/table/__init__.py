@@ -1,1 +1,0 @@
-"""Sensors of a football table, each in a file of its own."""
