@@ -1,1 +1,1 @@
-"""Client library: `client.connect` is for programs and people, `player` for controllers that `up` starts."""
+"""Client library: `client.connect` is for programs and interactive use, `player` for controllers that `up` starts."""

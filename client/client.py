@@ -1,4 +1,4 @@
-"""The library for programs and people: connect to a run, read its robots, command them, send and receive packets.
+"""Library for programs and interactive use: connect to a run, read its robots, command them, send and receive packets.
 
     with connect("run:newest", "hand") as client:
         client.subscribe("red.attack", "encoder")
@@ -9,7 +9,7 @@
 
 The name is one that the deployment declares under `clients`. In `lockstep` the run waits at each of the client's ticks
 until the loop's body is done; after `listen` it continues by itself. Everything travels as packets through the emulated
-network: what arrives is late, and some is lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
+network: packets arrive late, and some are lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
 frame (origin on the floor in the middle, z up). A client belongs to one thread.
 """
 
@@ -78,7 +78,7 @@ class Arrived:
     source: str
     channel: str
     sequence: int
-    """Grows with each packet of its source; what the network delivers twice has it twice."""
+    """Grows with each packet of its source; a packet that the network delivers twice has it twice."""
     sent_ns: int
     due_ns: int
     payload: bytes
@@ -163,7 +163,7 @@ class Actuator:
 
         `foosim components actuator KIND` explains the numbers of its kind. In lockstep a command is
         sent at the tick's end, and of several the last one counts; after `listen` it is sent at once. The robot keeps
-        its last command. Raises BadValue for names and numbers that are none of a command; NotJoined, RunEnded.
+        its last command. Raises BadValue for unknown fields and invalid numbers; NotJoined, RunEnded.
         """
         taker = self._client._encoder.actuator(self._robot, self._channel)
         if numbers and named:
@@ -196,7 +196,7 @@ class Actuator:
 
 
 class Robot:
-    """One robot: what it measures and what moves it, by the names in the deployment."""
+    """One robot: its sensors and actuators, by the names in the deployment."""
 
     def __init__(self, client: Client, name: str) -> None:
         self.name: Final = name
@@ -283,7 +283,7 @@ class Link:
 
 
 class Client:
-    """One connection to a run. Made by `connect`; use it in `with`. When a lockstep client goes, the run ends."""
+    """One connection to a run. Made by `connect`; use it in `with`. When a lockstep client leaves, the run ends."""
 
     def __init__(self, link: Link, deployment: Deployment) -> None:
         """`link` has been let in; the client closes it."""
@@ -308,7 +308,7 @@ class Client:
         self._jobs: dict[tuple[str, str], Jobs] = {}
         """By robot and channel of the actuator."""
 
-    # --- what it is --------------------------------------------------------------------------------------------------
+    # --- description -------------------------------------------------------------------------------------------------
 
     @property
     def tick(self) -> int:
@@ -333,7 +333,7 @@ class Client:
         """
         check_subscription(self.deployment, source, channel)
         if self._period is not None and (source, channel) not in self._subscriptions:
-            raise NotJoined(f"subscribe to {source} {channel} before lockstep() or listen(): this client has joined")
+            raise NotJoined(f"subscribe to {source} {channel} before lockstep() or listen(): it has joined")
         self._subscriptions.add((source, channel))
 
     def lockstep(self, rate_hz: float | Fraction | None = None) -> Iterator[int]:
@@ -351,9 +351,9 @@ class Client:
         return self._ticks(turns)
 
     def listen(self, subscriptions: Iterable[tuple[str, str]] = ()) -> None:
-        """Take part outside of lockstep, and receive these (endpoint, channel) beside those of `subscribe`.
+        """Take part outside of lockstep, and receive these (endpoint, channel) in addition to `subscribe`.
 
-        The vHub takes the client in at a tick soon after; what is sent before that is lost. Raises UnknownName and
+        The vHub admits the client at a tick soon after; packets sent before that are lost. Raises UnknownName and
         NotJoined.
         """
         for source, channel in subscriptions:
@@ -367,8 +367,8 @@ class Client:
     def command(self, commands: Commands) -> None:
         """Command robots, by name: `{"robot-1": {"v": 0.5, "w": 0.0}}`; see `Actuator.set`.
 
-        Raises UnknownName for a robot or an actuator, BadValue for names and numbers that are none of a command;
-        NotJoined, RunEnded.
+        Raises UnknownName for a robot or an actuator, BadValue for unknown fields and invalid numbers; NotJoined,
+        RunEnded.
         """
         for robot, command in sorted(commands.items()):
             for channel, payload in self._encoder.encode(robot, command):
@@ -392,14 +392,14 @@ class Client:
         self._link.perform()
 
     def broadcast(self, channel: str, payload: bytes) -> None:
-        """Send opaque bytes to all who have subscribed to this client's channel; otherwise as `send`.
+        """Send opaque bytes to all subscribers of this client's channel; otherwise as `send`.
 
         Each of them is one packet on a link of its own: some may get it, others not.
         """
         self.send("", channel, payload)
 
     def receive(self, timeout_s: float = 1.0) -> list[Arrived]:
-        """After `listen`: return what has arrived, waiting for it up to `timeout_s` of wall time.
+        """After `listen`: return the arrived packets, after at most `timeout_s` of wall time.
 
         The list is empty when nothing has. Sensors have their new samples with it. Raises RunEnded once the run is over
         and all has been taken, NotJoined and ConnectionFailed.
@@ -464,7 +464,7 @@ class Client:
                     self._answer()
 
     def _answer(self) -> None:
-        """Send what was set in the loop's body, commands last and in their robots' name order."""
+        """Send the packets and commands of the loop's body, commands last and in their robots' name order."""
         packets = [*self._outgoing, *self._due_jobs(), *(command for _, command in sorted(self._commands.items()))]
         self._outgoing.clear()
         self._commands.clear()
@@ -489,7 +489,7 @@ class Client:
         return [Packet(robot, channel, payload) for robot, channel, payload in due if payload is not None]
 
     def _send_jobs(self) -> None:
-        """After `listen`: send what is due of jobs; in lockstep that is sent with the tick."""
+        """After `listen`: send the due commands of jobs; in lockstep they are sent with the tick."""
         if self._period == 0 and not self._core.ended:
             for packet in self._due_jobs():
                 self.send(*packet)
@@ -503,12 +503,12 @@ class Client:
             if timeout_s is not None and passed_s >= timeout_s:
                 raise JobUnfinished(f"{job.what}: job {job.number} has not ended within {timeout_s:g} s")
             if self._period:
-                self._go_on()
+                self._next_tick()
             else:
                 self.receive(AGAIN_S)
 
-    def _go_on(self) -> None:
-        """In the body of a loop in lockstep: answer its tick, and come to the next one."""
+    def _next_tick(self) -> None:
+        """In the body of a loop in lockstep: answer its tick, and continue to the next one."""
         core = self._core
         self._check_sending()
         self._answer()
@@ -539,7 +539,7 @@ class Client:
         if self._core.ended:
             raise RunEnded("the run is over")
         if self._period is None:
-            raise NotJoined("a client that has not joined cannot send: lockstep() or listen() first")
+            raise NotJoined("the client has not joined: call lockstep() or listen() before sending")
 
     def _sample(self, robot: str, channel: str) -> Sample | None:
         if self._period is not None and (robot, channel) not in self._subscriptions:
@@ -588,13 +588,12 @@ def connect(
     """Connect to a run as the declared client `name`.
 
     `address` is `run:newest` or `run:NAME` for a run of this user on this machine, else that of the vHub's radio plane,
-    `tcp/HOST:PORT`.
-    `world` refuses any other world than this one. Where the run has certificates the address is `tls/HOST:PORT`, and
-    `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key. Raises BadValue for
-    a name or address that is none, CertificateError for a folder without valid certificates, NoRun for a run that is
-    not live, ConnectionFailed without
-    an answer within `timeout_s` (wall time), NotAuthorised and ConnectionRefused, with the reason, when the vHub will
-    not have the client.
+    `tcp/HOST:PORT`. `world` refuses any other world than this one. With certificates the address is `tls/HOST:PORT`,
+    and `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key.
+
+    Raises BadValue for an invalid name or address, CertificateError for a folder without valid certificates, NoRun
+    without such a live run, ConnectionFailed without an answer within `timeout_s` (wall time), NotAuthorised and
+    ConnectionRefused, with the reason, when the vHub rejects the client.
     """
     if not is_name(name):
         raise BadValue("not a name for a client", name)

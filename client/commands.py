@@ -29,7 +29,7 @@ class Taker(NamedTuple):
 
     @property
     def fields(self) -> Sequence[Field]:
-        """The fields of a plain command: without the number of a job, which is not the caller's to choose."""
+        """The fields of a plain command: without the number of a job, which the client chooses."""
         return self.codec.fields[:-1] if self.codec.has_job else self.codec.fields
 
     @property
@@ -44,7 +44,7 @@ class Taker(NamedTuple):
         return BadValue(f"{self.takes}: {what}", value, None if nearest is None else repr(nearest))
 
     def pack(self, command: object) -> bytes:
-        """Return the payload of a plain command. Raises BadValue for one that is none of this actuator."""
+        """Return the payload of a plain command. Raises BadValue for a command of another actuator."""
         return self.encode(self.value(command))
 
     def value(self, command: object) -> Any:
@@ -52,7 +52,7 @@ class Taker(NamedTuple):
         codec = self.codec
         if not isinstance(command, codec.kind):
             if isinstance(command, Struct):
-                raise self.wrong(f"a {type(command).__name__} is none of these")
+                raise self.wrong(f"a {type(command).__name__} is not one of these")
             values = self._named(command) if isinstance(command, Mapping) else self._ordered(command)
             command = codec.kind(**values)
         if self.joints:
@@ -119,7 +119,7 @@ class CommandEncoder:
 
         Of a robot with several actuators a command is commands by actuator, or of a type that one of them takes. A
         node clamps numbers beyond the actuator's limits, and counts such commands. Raises UnknownName for a robot or
-        an actuator that takes no such command, BadValue for names and numbers that are none of a command.
+        an actuator that takes no such command, BadValue for unknown fields and invalid numbers.
         """
         takers = self.actuators(robot)
         if isinstance(command, Struct):
@@ -149,7 +149,7 @@ class CommandEncoder:
         return takers[channel]
 
     def actuators(self, robot: str) -> tuple[Taker, ...]:
-        """Return what takes commands of a robot; of what is none, nothing."""
+        """Return the actuators of a robot that take commands; none for other names."""
         if robot not in self._deployment.robots:
             return ()
         if robot not in self._takers:

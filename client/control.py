@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Literal, Self
 
-from foosim.client.asking import Take, Taken, answer_to, ask
+from foosim.client.requests import Take, Taken, answer_to, exchange
 from foosim.common.errors import Failed, Refused
 from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.schema import Deployment
@@ -33,7 +33,7 @@ ANSWER_S: Final = 30.0
 CONNECT_S: Final = 10.0
 WAITING_MAX: Final = 256
 Role = Literal["operator", "viewer"]
-_ASKED_BY: Final[dict[str, tuple[type[Request], Channel]]] = {
+_REQUEST_OF: Final[dict[str, tuple[type[Request], Channel]]] = {
     "operator": (Request, channels.REQUEST),
     "viewer": (Inquiry, channels.INQUIRY),
 }
@@ -61,7 +61,7 @@ class Control:
         """Connect to the simulation plane's address; raises ConnectError when it is not reachable, or at `give_up`.
 
         `credentials` are an operator's, where the run has certificates. A `viewer` (whose credentials may also be a
-        viewer's) can ask for what changes nothing: status, describe, watch.
+        viewer's) may only send the requests status, describe, watch.
         """
         # A certificate permits any name that begins with its own and a dot.
         stem = f"{role}-{os.getpid()}-" if credentials is None else f"{credentials.name}."
@@ -84,7 +84,7 @@ class Control:
     def close(self) -> None:
         self._session.close()
 
-    def ask(
+    def request(
         self, verb: str, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False, **arguments: Any
     ) -> Answer:
         """Send a request and return the answer. Raises RequestRefused, or NoAnswer at the timeout or at `give_up`.
@@ -93,9 +93,9 @@ class Control:
         """
         self._requests += 1
         identity = f"{self._name[-7:]}-{self._requests}"
-        kind, channel = _ASKED_BY[self._role]
+        kind, channel = _REQUEST_OF[self._role]
         payload = encode(kind(self._name, identity, verb, encode_json(arguments)))
-        answer = self._ask(channel, payload, answer_to(channels.ANSWER, identity), timeout_s, give_up)
+        answer = self._exchange(channel, payload, answer_to(channels.ANSWER, identity), timeout_s, give_up)
         if answer is None:
             raise NoAnswer(f"no answer to {verb} within {timeout_s:g} s{self._hint()}")
         if not answer.accepted:
@@ -104,19 +104,19 @@ class Control:
 
     def status(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
         """Return the state of the run. Raises NoAnswer."""
-        content = decode_json(self.ask("status", timeout_s, give_up).result)
+        content = decode_json(self.request("status", timeout_s, give_up).result)
         assert isinstance(content, dict), content
         return content
 
     def describe(self, timeout_s: float = ANSWER_S, give_up: Callable[[], bool] = lambda: False) -> dict[str, Any]:
         """Return the description that is needed to read frames, of `supervisor.viewing`. Raises NoAnswer."""
-        content = decode_json(self.ask("describe", timeout_s, give_up).result)
+        content = decode_json(self.request("describe", timeout_s, give_up).result)
         assert isinstance(content, dict), content
         return content
 
     def view(self, inbox: Inbox) -> None:
         """Offer the frames that are shown to an inbox, as (key of `channels.VIEW`, ..., a `Commit`'s bytes). They come
-        while a viewer has a lease: `ask("watch", hz=50)`, again before it is over. Once for a connection.
+        while a viewer has a lease: `request("watch", hz=50)`, again before it is over. Once for a connection.
         """
         self._session.subscribe(channels.VIEW.key_for_all, channels.VIEW.key, inbox)
 
@@ -125,7 +125,7 @@ class Control:
     ) -> dict[str, bytes]:
         """Return the files that a deployment (read from the text that `describe` gives) refers to, by path.
 
-        Raises NoAnswer when `timeout_s` goes by without a piece of one.
+        Raises NoAnswer after `timeout_s` without a piece of a file.
         """
         fetching = Fetching(deployment, {})
         while (lacking := fetching.lacking) is not None:
@@ -136,14 +136,14 @@ class Control:
                 is_piece = key == channels.PIECE.key
                 return (is_piece and fetching.take(channels.read(channels.PIECE, self._name, content))) or None
 
-            if not self._ask(channels.FETCH, payload, take, timeout_s, give_up):
+            if not self._exchange(channels.FETCH, payload, take, timeout_s, give_up):
                 raise NoAnswer(f"no piece of a file of the deployment within {timeout_s:g} s{self._hint()}")
         return fetching.contents()
 
-    def _ask(
+    def _exchange(
         self, channel: Channel, payload: bytes, take: Take[Taken], timeout_s: float, give_up: Callable[[], bool]
     ) -> Taken | None:
-        return ask(self._wire, self._inbox, channel, self._name, payload, take, timeout_s, give_up)
+        return exchange(self._wire, self._inbox, channel, self._name, payload, take, timeout_s, give_up)
 
     def _hint(self) -> str:
         return "" if self._credentials is None else f"; is {self._credentials.identity} {_MAY[self._role]} of this run?"
@@ -171,10 +171,10 @@ def pki_of(info: RunInfo) -> Path | None:
 def request(verb: str, run: str | None = None, **arguments: Any) -> Answer:
     """Send a request to the newest live run, or to the one named, and return the answer; None arguments are left out.
 
-    Raises what `connect` and `Control.ask` raise.
+    Raises the errors of `connect` and `Control.request`.
     """
     with connect(run) as control:
-        return control.ask(verb, **{name: value for name, value in arguments.items() if value is not None})
+        return control.request(verb, **{name: value for name, value in arguments.items() if value is not None})
 
 
 def status(run: str | None = None) -> dict[str, Any]:

@@ -68,11 +68,11 @@ class ClientStatistics:
     unsent: int = 0
     """Packets that were not sent, since too many wait to be recorded."""
     returns: int = 0
-    """How often it went on after the vHub was gone."""
+    """The count of returns after a loss of the vHub."""
 
 
 class ClientCore:
-    """One client's state machine. `actions` are what the shell performs next."""
+    """One client's state machine. `actions` are the shell's next steps."""
 
     def __init__(self, name: str, boot: str, now_ns: int, world: str = "") -> None:
         """`world` is empty when the client accepts any world."""
@@ -125,7 +125,7 @@ class ClientCore:
             Heard: self._on_heard,
         }
 
-    # --- what the shell calls --------------------------------------------------------------------------------------
+    # --- calls of the shell ----------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
         """Handle one message; an invalid one is counted and dropped."""
@@ -175,7 +175,7 @@ class ClientCore:
         if self.is_away:
             return
         self.is_away = True
-        self._lost_ns = now_ns + self._patience_ns(self.deployment)
+        self._lost_ns = now_ns + self._outage_ns_max(self.deployment)
         self._again_ns, self._again_after_ns = now_ns, AWAY_AGAIN_NS
         self._resend_ns = NEVER_NS
         self.actions.append(Log("warning", "the vHub is gone; waits for it to come back"))
@@ -188,9 +188,9 @@ class ClientCore:
     def rest(self, stood_ns: int, now_ns: int) -> None:
         """Exclude a standstill of the client's own loop from the vHub's deadline (`runtime.standstill`)."""
         if self._lost_ns != NEVER_NS and self.deployment is not None:
-            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self._patience_ns(self.deployment))
+            self._lost_ns = min(self._lost_ns + stood_ns, now_ns + self._outage_ns_max(self.deployment))
 
-    def _patience_ns(self, deployment: Deployment) -> int:
+    def _outage_ns_max(self, deployment: Deployment) -> int:
         """How long to wait for a lost vHub. Before its first message this is the time for a start."""
         deadlines = deployment.deadlines
         has_begun = self._answered or self._received
@@ -201,7 +201,7 @@ class ClientCore:
         packets = self._received, self._sent, self._answered, self._unsent
         return ClientStatistics(*downlinks, *packets, self._returns)
 
-    # --- what the client does --------------------------------------------------------------------------------------
+    # --- calls of the client ---------------------------------------------------------------------------------------
 
     def join(
         self,
@@ -327,7 +327,7 @@ class ClientCore:
 
     def _is_for_me(self, message: ClientWelcome | ClientRefusal) -> bool:
         if message.name != self.name:
-            raise Malformed(f"a message on the key of {self.name} that names {message.name}")
+            raise Malformed(f"a message on the key of {self.name} names {message.name}")
         return message.boot == self.boot
 
     def _on_heard(self, heard: Heard) -> None:
@@ -428,7 +428,7 @@ class ClientCore:
             self._resend_ns = NEVER_NS
 
     def _resend(self, whole: bool) -> None:
-        """Repeat the packets that are not recorded: all, or as many as fit one message."""
+        """Repeat the unrecorded packets: all, or as many as fit one message."""
         for part in split(self._unrecorded, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part)))
             if not whole:

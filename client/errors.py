@@ -57,4 +57,4 @@ class JobCancelled(JobError):
 
 
 class JobUnfinished(Refused):
-    """A job that has not ended in the time that one wanted to wait."""
+    """A job has not ended within the time of the wait."""

@@ -1,4 +1,4 @@
-"""Jobs of an actuator, as who commands it sees them: commands with numbers, and how they stand by the job sensor.
+"""Jobs of an actuator on the side of the commander: commands with numbers, and their states by the job sensor.
 
 It sends and receives nothing itself: players, simulations and the client library hand it samples, and send the commands
 that are due. A player:
@@ -27,7 +27,7 @@ from foosim.world.components.job_reading import JobSettings
 from foosim.world.forms.jobs import JOB, JobState
 
 REPEAT_NS: Final = 100_000_000
-"""Simulated time after which a command is sent again that is not known to have been taken."""
+"""Simulated time after which a command without a known effect is sent again."""
 ENDS: Final[dict[JobState, type[JobError]]] = {
     JobState.FAILED: JobFailed,
     JobState.PREEMPTED: JobPreempted,
@@ -38,7 +38,7 @@ ENDS: Final[dict[JobState, type[JobError]]] = {
 class Job:
     """One job: `number` is None as long as it has not been sent, `state` NONE as long as it is not known to be taken.
 
-    `by` is who commanded the robot after it, where that is known of a job that was preempted; `why` is a sentence on
+    `by` is the next commander, where known, of a preempted job; `why` is a sentence on
     why it has failed, where the actuator gives a reason.
     """
 
@@ -90,23 +90,23 @@ class Jobs:
         kind = its.actuators[actuator].component_type
         self._failures: Mapping[float, str] = getattr(kind.factory, "FAILURES", {})
         if not kind.jobs:
-            raise BadValue(f"{self.what} does no jobs", its.actuators[actuator].kind)
+            raise BadValue(f"{self.what} has no jobs", its.actuators[actuator].kind)
         self.senders: Final = deployment.senders_to(robot)
         if sender not in self.senders:
-            raise UnknownName(f"{self.what} takes no jobs of it", sender, self.senders)
-        telling = {
+            raise UnknownName(f"{self.what} takes no jobs from it", sender, self.senders)
+        reporting = {
             channel for channel, one in its.sensors.items() if isinstance(one, JobSettings) and one.actuator == actuator
         }
-        if not telling:
+        if not reporting:
             raise BadValue(f"{robot} has no sensor of the kind job for its actuator", actuator)
         if sender in deployment.players:
             heard = {channel for endpoint, channel in deployment.heard_by(sender) if endpoint == robot}
-            if telling.isdisjoint(heard):
+            if reporting.isdisjoint(heard):
                 raise BadValue(
-                    f"{sender} does not hear {' or '.join(sorted(telling))} of {robot}, the sensor of", actuator
+                    f"{sender} does not hear {' or '.join(sorted(reporting))} of {robot}, the job sensor of", actuator
                 )
-            telling &= heard
-        self.heard: Final = (robot, min(telling))
+            reporting &= heard
+        self.heard: Final = (robot, min(reporting))
         """The (robot, channel) that reports their states."""
         self.sender, self.robot, self.actuator = sender, robot, actuator
         self._row = self.senders.index(sender)
@@ -123,7 +123,7 @@ class Jobs:
     def call(self, *numbers: Any, **named: Any) -> Job:
         """Begin a job, by the numbers of a command in their order or by name; it is sent by `commands`.
 
-        Raises BadValue for names and numbers that are none of a command.
+        Raises BadValue for unknown fields and invalid numbers.
         """
         if numbers and named:
             raise self._taker.wrong("numbers are given by name or in their order, not both")
@@ -148,11 +148,11 @@ class Jobs:
 
     @property
     def running(self) -> str:
-        """Whose job the actuator does, by the newest reading; empty for none."""
+        """The sender of the running job, by the newest reading; empty for none."""
         at = 0 if self._reading is None else int(self._reading.running)
         return self.senders[at - 1] if at else ""
 
-    # --- what is heard and sent --------------------------------------------------------------------------------------
+    # --- packets ----------------------------------------------------------------------------------------------------
 
     def hear(self, samples: Samples) -> None:
         """Take the newest sample of the job sensor."""
@@ -185,7 +185,7 @@ class Jobs:
         self._open = [job for job in self._open if not job.state.has_ended]
 
     def due(self, tick: int) -> Any | None:
-        """Return the command that is to be sent at a tick, with its job's number; None where there is nothing to send.
+        """Return the command to send at a tick, with its job's number; None for none.
 
         It is sent again until a reading reports it as taken. The first one waits for a reading, which has the
         number of the last job before a restart; and a number is above that of the tick, so that none is used twice.
@@ -205,11 +205,11 @@ class Jobs:
         return msgspec.structs.replace(command, **{JOB: float(number)})
 
     def commands(self, tick: int) -> Commands:
-        """Return what is `due` as a player returns it, and `Simulation.step` takes it."""
+        """Return the `due` command as a player returns it, and `Simulation.step` takes it."""
         command = self.due(tick)
         return {} if command is None else {self.robot: {self.actuator: command}}
 
     def payload(self, tick: int) -> bytes | None:
-        """Return what is `due` as the payload of a packet to the actuator's channel."""
+        """Return the `due` command as the payload of a packet to the actuator's channel."""
         command = self.due(tick)
         return None if command is None else self._taker.encode(command)

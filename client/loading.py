@@ -96,7 +96,7 @@ def _unfit(made: Any, name: str) -> str:
     if not issubclass(made, Player):
         return f"{name} is no Player{place_of_code(made)}; write: from foosim import Player, class {name}(Player):"
     if inspect.isabstract(made):
-        return f"{name} is abstract: none can be made of it"
+        return f"{name} is abstract: it cannot be instantiated"
     taken = _other_arguments(made, *MADE_WITH)
     if taken:
         return f"{name} cannot be made with ({', '.join(MADE_WITH)}): its constructor takes {taken}"
@@ -109,7 +109,7 @@ def _unfit(made: Any, name: str) -> str:
 
 
 def _other_arguments(call: Callable[..., Any], *arguments: str) -> str:
-    """Return what something takes that cannot be called with these arguments; empty where it can, or may."""
+    """Return the parameters of a callable that these arguments do not fit; empty where they fit, or may."""
     try:
         signature = inspect.signature(call)
     except (ValueError, TypeError):  # of C code without a signature

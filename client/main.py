@@ -104,7 +104,7 @@ def run_players(
         if not is_name(name):
             raise BadValue("not a name for a player", name)
         if names.count(name) > 1:
-            raise BadValue("a player that is named twice", name)
+            raise BadValue("player named twice", name)
     stop = Stop()
     log = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} others"
     process = Process(log, progress, is_shared=len(names) > 1)

@@ -17,7 +17,7 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Sent
 
 PACKET_OVERHEAD_BYTES: Final = 128
-"""No packet takes more in a message beside its payload: two names and two numbers."""
+"""The greatest size of a packet in a message without its payload: two names and two numbers."""
 
 
 def check_packet(deployment: Deployment, packet: Packet) -> None:

@@ -1,4 +1,4 @@
-"""Players: the base class of a controller, what it gets, and what it returns.
+"""Players: the base class of a controller, its inputs and its outputs.
 
 The deployment names a player's class as `module:Class`, with a rate, the robots that it may command and hear, and
 parameters. `client.playing` runs it.
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Packet(NamedTuple):
     """A packet to send: opaque `payload` to a robot's (or another client's) `channel`.
 
-    An empty `destination` is a broadcast: it goes to all who have subscribed to this client's `channel`.
+    An empty `destination` is a broadcast to all subscribers of this client's `channel`.
     """
 
     destination: str
@@ -60,11 +60,11 @@ class Turn:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Player:
-    """A controller: derive from it and override what is needed. It sees packets only: samples are as old as the network
+    """A controller: derive from it and override its hooks. It sees packets only: samples are as old as the network
     made them, and some never come.
 
     It exists while one of its robots is in the world. When the last one is removed it is not called any more; when one
-    is added, another player is made, which has heard nothing.
+    is added, another player is created, which has received nothing.
     """
 
     robots: tuple[str, ...] = ()

@@ -57,14 +57,14 @@ class Newest:
 
 
 class Acting:
-    """The player that a deployment declares under a name, made, and what it has heard: `act` is one turn of it."""
+    """An instance of a declared player and its received samples: `act` is one turn of it."""
 
     def __init__(
         self, deployment: Deployment, name: str, load: Callable[[str], PlayerFactory] = load_player, tick: int = -1
     ) -> None:
         """`tick` is the newest tick that is known, for messages.
 
-        Raises PlayerError for a name that is not declared, and for a player that cannot be loaded or made.
+        Raises PlayerError for an undeclared name, and for a player that cannot be loaded or created.
         """
         if name not in deployment.players:
             raise PlayerError(UnknownName("not declared as a player", name, deployment.players).what)
@@ -83,7 +83,7 @@ class Acting:
     def exist(self, since: int, absent: Collection[str], tick: int) -> None:
         """Be the player that exists since a tick, before it acts at another one; these of its robots are `absent`.
 
-        It is made anew, and has heard nothing, where the one before has existed since another tick. Raises PlayerError.
+        It is created anew, without samples, where the one before has existed since another tick. Raises PlayerError.
         """
         wanted: tuple[int | str, ...] = (since, *absent)
         if wanted == self._known:
@@ -127,13 +127,13 @@ class Acting:
         """Return the player's packets to others, and to its robots' channels."""
         deployment, declared = self._deployment, self.declared
         if not isinstance(packets, Sequence) or not all(isinstance(packet, Packet) for packet in packets):
-            raise PlayerError(f"{where}: a turn's packets are a {type(packets).__name__}, not a sequence of Packet")
+            raise PlayerError(f"{where}: packets is a {type(packets).__name__}; expected a sequence of Packet")
         for packet in packets:
             to = packet.destination
             if to in deployment.robots and to not in declared.robots:
                 raise PlayerError(f"{where}: {UnknownName('not one of its robots', to, declared.robots)}")
             if not isinstance(packet.payload, bytes):
-                raise PlayerError(f"{where}: a payload is a {type(packet.payload).__name__}, not bytes")
+                raise PlayerError(f"{where}: a payload is a {type(packet.payload).__name__}; expected bytes")
             try:
                 check_packet(deployment, packet)
             except (UnknownName, PacketError) as error:
@@ -145,7 +145,7 @@ class Acting:
         declared, encoder = self.declared, self._encoder
         if not isinstance(commands, Mapping):
             kind = type(commands).__name__
-            raise PlayerError(f"{where}: act gave a value of type {kind}, not a mapping from robots to commands")
+            raise PlayerError(f"{where}: act returned a {kind}; expected a mapping from robots to commands")
         packets = []
         for robot, command in sorted(commands.items(), key=_by_name):
             if robot not in declared.robots:

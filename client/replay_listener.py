@@ -73,12 +73,12 @@ class Replay:
         self._session = session
         self._inbox = Inbox(limits.INBOX_MESSAGES_MAX)
         self._received: deque[Played] = deque()
-        self._asked = 0
+        self._requests = 0
         self._deployment: Deployment | None = None
         self._old_names: Mapping[str, str] = {}
         self._old_channels: Mapping[str, str] = {}
         self._open = set(streams)
-        """The streams that have not ended."""
+        """The open streams."""
         keys = [PLAYED.key_for_all] if self._open == set(STREAMS) else [PLAYED.key_for(stream) for stream in streams]
         for key in keys:
             session.subscribe(key, PLAYED.key, self._inbox)
@@ -167,37 +167,37 @@ class Replay:
     # --- requests ----------------------------------------------------------------------------------------------------
 
     def status(self) -> dict[str, Any]:
-        """Return the state of the replay, and what it plays."""
-        return self.ask("status")
+        """Return the state of the replay, and its deployment."""
+        return self.request("status")
 
     def pause(self) -> dict[str, Any]:
         """Pause; as each of these requests, return the status after it. Raises ReplayRefused, ReplayGone."""
-        return self.ask("pause")
+        return self.request("pause")
 
     def resume(self) -> dict[str, Any]:
-        return self.ask("resume")
+        return self.request("resume")
 
     def step(self, ticks: int = 1) -> dict[str, Any]:
         """Publish `ticks` ticks at once, and pause after them."""
-        return self.ask("step", count=ticks)
+        return self.request("step", count=ticks)
 
     def seek(self, time_ns: int) -> dict[str, Any]:
         """Continue from a captured time."""
-        return self.ask("seek", time_ns=time_ns)
+        return self.request("seek", time_ns=time_ns)
 
     def set_rate(self, pace: str) -> dict[str, Any]:
         """Change the rate: realtime, fast, or a factor such as 2x."""
-        return self.ask("rate", pace=pace)
+        return self.request("rate", pace=pace)
 
     def stop(self) -> dict[str, Any]:
-        return self.ask("stop")
+        return self.request("stop")
 
-    def ask(self, verb: str, timeout_s: float = ANSWER_S, **arguments: Any) -> dict[str, Any]:
+    def request(self, verb: str, timeout_s: float = ANSWER_S, **arguments: Any) -> dict[str, Any]:
         """Send a request and return the status after it; messages that arrive meanwhile are kept for `take`."""
-        from foosim.client.asking import answer_to, ask
+        from foosim.client.requests import answer_to, exchange
 
-        self._asked += 1
-        identity = f"r{self._asked}"
+        self._requests += 1
+        identity = f"r{self._requests}"
         payload = encode(Request(self._name, identity, verb, encode_json(arguments)))
         find = answer_to(channels.REPLAY_ANSWER, identity)
 
@@ -208,25 +208,27 @@ class Replay:
         def is_over() -> bool:
             return self.ended or self._is_gone
 
-        answer = ask(self._wire, self._inbox, channels.REPLAY_REQUEST, self._name, payload, take, timeout_s, is_over)
+        answer = exchange(
+            self._wire, self._inbox, channels.REPLAY_REQUEST, self._name, payload, take, timeout_s, is_over
+        )
         if answer is None:
             raise ReplayGone("the replay has ended" if is_over() else f"no answer to {verb} within {timeout_s:g} s")
         if not answer.accepted:
             raise ReplayRefused(answer.text)
         status = decode_json(answer.result)
         if not isinstance(status, dict):
-            raise ReplayRefused("an answer that is no status")
+            raise ReplayRefused("the answer is not a status")
         return status
 
     def learn(self, timeout_s: float) -> None:
-        """Request what is played, which is needed to decode payloads; `hear_replay` does."""
-        status = self.ask("status", timeout_s)
+        """Request the played deployment, which is needed to decode payloads; `hear_replay` does."""
+        status = self.request("status", timeout_s)
         try:
             deployment, name = str(status["deployment"]), str(status["deployment_name"])
             self._old_names = {str(new): str(old) for old, new in status["names"].items()}
             self._old_channels = {str(new): str(old) for old, new in status["channels"].items()}
         except (KeyError, AttributeError) as error:
-            raise ReplayRefused(f"the replay's status does not have what it plays: {error}") from None
+            raise ReplayRefused(f"the replay's status lacks its deployment: {error}") from None
         self._deployment = load_deployment(deployment, name)
 
     def close(self) -> None:

@@ -1,8 +1,7 @@
-"""Readings and commands as vectors of numbers, for what learns: columns with names, units and limits.
+"""Readings and commands as vectors of numbers, for learning: columns with names, units and limits.
 
 The columns are those of the declared sensors and actuators, in the order of (robot, channel), and within a channel
-those of its fields. Values are in SI units. Readings and commands that are not numbers, or not always as many, have no
-columns.
+those of its fields. Values are in SI units. Readings and commands without a fixed count of numbers have no columns.
 """
 
 from __future__ import annotations
@@ -29,14 +28,14 @@ Vector: TypeAlias = NDArray[np.float64]
 Pair: TypeAlias = tuple[str, str]
 """A robot and a channel of it."""
 NEVER_S: Final = -1.0
-"""The age of a reading that has not come yet."""
+"""The age of a reading before the first one."""
 EVERYTHING: Final = ("*",)
 Bounds: TypeAlias = tuple[float, float]
 NO_BOUNDS: Final[Mapping[str, Bounds]] = {}
 
 
 class Column(NamedTuple):
-    """One number of a vector: whose it is, its field and unit, and the least and the greatest value."""
+    """One number of a vector: its channel, field and unit, and the least and the greatest value."""
 
     robot: str
     channel: str
@@ -56,7 +55,7 @@ class _Part(NamedTuple):
 
 
 def numbers_in(one: BoundSensor | BoundActuator) -> int:
-    """Return how many numbers a reading or plain command has; 0 of one that is not numbers, or not always as many."""
+    """Return the count of numbers of a reading or plain command; 0 without a fixed count of numbers."""
     made: Any = one.sensor if isinstance(one, BoundSensor) else one.actuator
     size = one.size or len(getattr(made, "bounds", tuple)() or ())
     return size - one.codec.has_job if size else 0
@@ -127,7 +126,7 @@ class ReadingVector:
         self._ages = ages
 
     def join(self, newest: Mapping[Pair, Received], now_ns: int) -> Vector:
-        """Return the vector of the newest packet of each channel, at a time (ns); 0 for what has not come."""
+        """Return the vector of the newest packet of each channel, at a time (ns); 0 for channels without one."""
         found = [newest.get(pair) for pair in self.pairs]
         payloads = [nothing if one is None else one.payload for one, nothing in zip(found, self._nothing, strict=True)]
         if not self._ages:
@@ -149,7 +148,7 @@ class CommandVector:
         """`globs` of `robot/channel` select among the actuators of these robots.
 
         `bounds` are least and greatest values by globs of `robot/channel.field`, within the limits of the actuators.
-        Raises UnknownName for a glob that selects nothing, BadValue for bounds that are none.
+        Raises UnknownName for a glob that selects nothing, BadValue for invalid bounds.
         """
         layout = build_layout(deployment)
         fitted = {
@@ -169,10 +168,10 @@ class CommandVector:
         """Return the commands of a vector as packets, in the order of (robot, channel).
 
         Numbers beyond a column's limits are clipped to these. Raises BadValue for a vector of another shape, and for a
-        number that is not finite.
+        non-finite number.
         """
         if vector.shape != (len(self.columns),):
-            raise BadValue(f"an action has {len(self.columns)} numbers, this one has the shape {vector.shape}")
+            raise BadValue(f"an action of shape {vector.shape}; expected ({len(self.columns)},)")
         numbers: list[float] = vector.tolist()
         if not all(map(isfinite, numbers)):
             number, column = next(pair for pair in zip(numbers, self.columns, strict=True) if not isfinite(pair[0]))

@@ -5,8 +5,8 @@
     with foosim.Simulation("deploy/table.yaml") as simulation:
         simulation.step({"red.goal": {"slide": 0.05, "spin": 0.0}})
 
-`foosim.components` has what components of one's own are made of, `foosim.env` environments for learning. What is not
-used is not imported.
+`foosim.components` has the base classes and types of your own components, `foosim.env` environments for learning.
+Modules are imported at their first use.
 """
 
 TYPE_CHECKING = False
@@ -61,7 +61,7 @@ _MODULES = {
 
 
 def __getattr__(name: str) -> object:
-    """Import what is asked for."""
+    """Import a name at its first use."""
     import sys
     from importlib import import_module
 

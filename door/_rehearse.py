@@ -40,16 +40,16 @@ def rehearse(
     frame to begin with, `CAPTURE@12.5s`. The result has the JSON object of a run (`json`) and D(tick) of each tick
     (`digests`).
 
-    Raises DeploymentError, AssetError, BadValue for an event that is none or that the run refuses, CaptureError.
+    Raises DeploymentError, AssetError, BadValue for an invalid event or one that the run refuses, CaptureError.
     """
     path = Path(deployment)
     text = apply_sets(read_deployment_text(path), path.name, sets)
     declared = read_for_stepping(path, sets)
-    asked = Events(events, declared, nodes)
+    requested = Events(events, declared, nodes)
     begin = None if start is None else read_branch(start, declared).start
     kept = None if capture is None else Path(capture)
     result = rehearse_text(
-        text, path.name, ticks, nodes, prepare=asked.prepare, capture=kept, folder=path.parent, start=begin
+        text, path.name, ticks, nodes, prepare=requested.prepare, capture=kept, folder=path.parent, start=begin
     )
-    asked.check(result.answers)
+    requested.check(result.answers)
     return result

@@ -1,4 +1,4 @@
-"""What components of one's own are made of: decorators, settings, views, units, bodies.
+"""The parts of your own components: decorators, settings, views, units, bodies.
 
 `m`, `rad`, `m_s` and so on are the types of numbers in readings and commands: floats with a unit. `Length`, `Speed`
 and so on are the types of settings: texts with a unit in a deployment, SI numbers in the code.
@@ -146,7 +146,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import what link models return where one is made: no other component needs the network."""
+    """Import the results of link models at their first use: no other component needs the network."""
     import sys
 
     if name == "Judged":

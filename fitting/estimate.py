@@ -26,15 +26,15 @@ STEPS: Final = Pairs(1e-6, 1e-4, 1e-4, 1e-4)
 """By how much a surface is changed for a derivative; of starts see START_STEPS."""
 START_STEPS: Final = (1e-5, 1e-5, 1e-4, 1e-4, 1e-3)
 BEGINNING: Final = 10
-"""A start is guessed from so many of the first points."""
+"""The count of first points from which a start is estimated."""
 CONFIDENCE: Final = 0.95
 HORIZONS_S: Final = (0.3, 0.6, 1.2)
-"""The fit begins with so much of each track, and goes on with more from what it has found: a rebound at a wrong time,
-which a start at a wrong speed comes to, would keep it from the right one."""
+"""The fit begins with this part of each track, and continues with more from its result: a rebound at a wrong time,
+as after a start at a wrong speed, would keep it from the right one."""
 SCALES: Final = Pairs(2e-4, 0.1, 0.1, 0.1)
 HELD_M: Final = 0.003
-"""On the way there a surface that is SCALES beside where it began counts as much as a place that is this far off: what
-so short a track does not tell stays."""
+"""Until then a surface that is SCALES off its start counts as much as a place that is this far off: a surface that so
+short a track does not determine stays."""
 WALLS: Final = 0.05
 """The fit begins with no more friction at walls: where that is enough to stop the slip, more of it changes nothing, and
 no derivative leads back."""
@@ -42,17 +42,17 @@ ROLLS: Final = (0.9, 0.1)
 """In the starts that the fit begins with balls roll so much, and the better one of two fits counts: where a ball begins
 to roll, and whether a rebound stops its slip, gives the squares several minima."""
 HOPS: Final = (2, 10)
-"""From the best fit so many more begin beside it, about HOP standard errors off, where other minima are: the most while
-residuals are more than SCATTER times what the measured places scatter by."""
+"""The counts of further fits that begin about HOP standard errors off the best one, to find other minima: the greater
+one while residuals are more than SCATTER times the scatter of the measured places."""
 SCATTER: Final = 1.1
 HOP: Final = 4.0
 HOP_MOST: Final = Start(0.003, 0.003, 0.05, 0.05, 0.3)
 """A standard error is at most that, and of surfaces at most SCALES."""
 TRIES_MAX: Final = 60
 SLOW: Final = 0.1
-"""m/s: what comes to a wall more slowly may as well have been lost in the noise."""
+"""m/s: slower rebounds are within the noise."""
 BESIDE: Final = 4
-"""Speeds before and after a rebound are measured over so many points."""
+"""The count of points over which speeds before and after a rebound are measured."""
 KNOWN: Final = 0.5
 """An interval that reaches farther than this share of its value, to either side, is not determined by the tracks."""
 
@@ -63,7 +63,7 @@ class NoLeastSquares(Failed):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A surface's value, half of its interval of confidence, and whether the tracks tell it."""
+    """A surface's value, half of its interval of confidence, and whether the tracks determine it."""
 
     value: float
     half: float
@@ -87,9 +87,9 @@ class Result:
 
 
 def fit(tracks: Sequence[Array], field: Field, first: Pairs) -> Result:
-    """Return the surfaces that fit tracks best. `first` are those that the fit begins with.
+    """Return the surfaces that fit tracks best. The fit begins with `first`.
 
-    The rows of a track are time (s), x and y (m). Where no track comes back from a wall nothing of walls is fitted.
+    The rows of a track are time (s), x and y (m). Without a rebound walls are not fitted.
     Raises NoLeastSquares.
     """
     first = first._replace(bounce=_bounce(tracks, field) or first.bounce, walls=min(first.walls, WALLS))
@@ -122,7 +122,7 @@ def _begin(tracks: Sequence[Array], field: Field, first: Pairs, names: Sequence[
 
 
 def _hop(problem: _Problem, best: Any, scatter: float) -> Any:
-    """Return the best of a fit and those that begin beside it."""
+    """Return the best of a fit and the ones that begin near it."""
     key = draw_key(0, "fit", "hop")
     least, most = HOPS
     for hop in range(most):
@@ -144,18 +144,18 @@ def _noise(found: Any) -> float:
 
 
 def _errors(found: Any) -> Array:
-    """Return the standard errors of what was fitted, infinite where nothing determines them.
+    """Return the standard errors of the fitted values, infinite for undetermined ones.
 
     They are the roots of the diagonal of the inverse of J^T J, times the variance of the residuals.
     """
     jac = found.jac
     scale = np.sqrt((jac * jac).sum(axis=0))
-    is_told = scale > 0.0
-    scale[~is_told] = 1.0
+    is_known = scale > 0.0
+    scale[~is_known] = 1.0
     _, singular, rows = np.linalg.svd(jac / scale, full_matrices=False)
     singular = np.maximum(singular, 1e-10 * singular[0])
     errors: Array = _noise(found) * np.sqrt(((rows / singular[:, None]) ** 2).sum(axis=0)) / scale
-    errors[~is_told] = np.inf
+    errors[~is_known] = np.inf
     return errors
 
 
@@ -187,7 +187,7 @@ def _upto(track: Array, horizon: float) -> Array:
 
 
 def rebounds(tracks: Sequence[Array], field: Field) -> list[float]:
-    """Return by how much of its speed onto the wall each rebound of tracks comes back, as their points tell."""
+    """Return the restitution of each rebound of tracks, estimated from its points."""
     found = []
     for track in tracks:
         for axis, most in ((1, field.x), (2, field.y)):
@@ -209,15 +209,15 @@ def _slope(rows: Array, axis: int) -> float:
 
 
 def _bounce(tracks: Sequence[Array], field: Field) -> float | None:
-    """Return the restitution that the points beside rebounds tell, roughly; None without a rebound."""
+    """Return the median restitution of rebounds, within limits; None without a rebound."""
     found = rebounds(tracks, field)
     return min(max(float(np.median(found)), 0.05), 0.98) if found else None
 
 
 class _Problem:
-    """The residuals of all tracks and their derivatives, by the vector of what is fitted: surfaces, then starts.
+    """The residuals of all tracks and their derivatives, by the fitted vector: surfaces, then starts.
 
-    `is_held`: surfaces are held to what the fit began with, by residuals of their own.
+    `is_held`: surfaces are held to the start of the fit, by residuals of their own.
     """
 
     def __init__(
@@ -233,11 +233,11 @@ class _Problem:
         self.hop_most = np.array([*(getattr(SCALES, name) for name in names), *HOP_MOST * len(tracks)])
 
     def solve(self, vector: Array) -> Any:
-        """Return what scipy finds that begins with this vector. Raises NoLeastSquares."""
+        """Return scipy's result from this start. Raises NoLeastSquares."""
         try:
             from scipy.optimize import least_squares
         except ImportError:
-            raise NoLeastSquares("the fit needs scipy, which is not installed: pip install 'foosim[fit]'") from None
+            raise NoLeastSquares("the fit needs scipy: pip install 'foosim[fit]'") from None
         return least_squares(
             self.residuals,
             self._within(vector),
@@ -250,7 +250,7 @@ class _Problem:
         )
 
     def _within(self, vector: Array) -> Array:
-        """Return a vector that is not on a bound, where the solver cannot begin."""
+        """Return a vector off the bounds, on which the solver cannot begin."""
         low, high = np.array(self.bounds)
         edge = 1e-6 * (high - low)
         begun: Array = np.clip(vector, low + edge, high - edge)

@@ -28,15 +28,15 @@ app = new_app()
 BYTES_MAX: Final = 100_000_000
 DOUBTED: Final = 2.0
 DOUBTED_M: Final = 0.002
-"""A track is doubted whose residuals are more than DOUBTED times the scatter of its points and so many metres, by which
-the motion itself may be wrong after several rebounds."""
+"""A track is doubted at residuals above DOUBTED times the scatter of its points plus this length, an error of the
+motion itself after several rebounds."""
 WRITTEN: Final = {
     "floor": ("floor", "friction", 1.0, ""),
     "rolling": ("floor", "rolling_friction", 1e3, " mm"),
     "bounce": ("walls", "restitution", 1.0, ""),
     "walls": ("walls", "friction", 1.0, ""),
 }
-"""Where what is fitted stands in `table.surfaces`, in which unit."""
+"""The places of fitted values in `table.surfaces`, and their units."""
 
 
 @app.command(name="fit")
@@ -55,20 +55,20 @@ def fit_command(
 ) -> int:
     """Fit rolling friction, friction and restitution of a table to measured tracks.
 
-    A track is where a free ball was, that no figure touched: columns `time`, `x` and `y`, each with its unit in the
-    header (`time [s]` or `time_s`), in the table's frame of reference. A column `track` tells several tracks of a file
-    apart. A track is used up to where the ball comes over a corner ramp or before a goal.
+    A track has the places of a free ball that no figure touched: columns `time`, `x` and `y`, each with its unit in the
+    header (`time [s]` or `time_s`), in the table's frame of reference. A column `track` separates several tracks of a
+    file. A track is used up to where the ball comes over a corner ramp or before a goal.
 
-    The YAML has what the tracks tell, each value with half of its interval of 95 % confidence; a deployment whose table
-    is a preset includes it. What they do not determine is left out, with a message. No existing file is overwritten.
+    The YAML has the determined surfaces, each value with half of its interval of 95 % confidence; a deployment with a
+    preset table includes it. Undetermined ones are left out, with a message. No existing file is overwritten.
     It needs scipy: pip install 'foosim[fit]'.
     """
     # Before scipy is imported. The matrices are small: threads would wait for each other longer than they compute.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if out is not None and out.exists():
-        raise BadValue(f"--out {out}: it exists, and is never overwritten")
+        raise BadValue(f"--out {out}: the file exists, and is never overwritten")
     if out is not None and not out.parent.is_dir():
-        raise BadValue(f"--out {out}: there is no folder {out.parent}")
+        raise BadValue(f"--out {out}: no folder {out.parent}")
     spec = load_deployment(apply_sets(read_source_file(table), str(table), sets or ()), str(table))
     if TABLE not in spec.kits:
         raise BadValue(f"--table {table}: a deployment without a table section")
@@ -127,7 +127,7 @@ def _first(table: Table) -> Pairs:
 def _doubts(found: Result, tracks: list[Track]) -> Iterator[str]:
     """Yield the reasons why intervals do not hold."""
     if not found.is_converged:
-        yield "the fit did not come to an end: values and intervals may be wrong; more or longer tracks tell more"
+        yield "the fit did not converge: values and intervals may be wrong; give more or longer tracks"
     for track, residuals in zip(tracks, found.of_tracks, strict=True):
         scatter = scatter_of(track.rows)
         if residuals > DOUBTED * scatter + DOUBTED_M:
@@ -138,19 +138,19 @@ def _doubts(found: Result, tracks: list[Track]) -> Iterator[str]:
 
 
 def _unknown(found: Result) -> Iterator[str]:
-    """Yield what the tracks do not tell."""
+    """Yield messages about undetermined surfaces."""
     if "bounce" not in found.pairs:
-        yield "no track comes back from a wall: walls.restitution and walls.friction are not fitted"
+        yield "no track has a rebound from a wall: walls.restitution and walls.friction are not fitted"
     for name, one in found.pairs.items():
         if not one.is_known:
             surface, key, times, unit = WRITTEN[name]
             value = f"{one.value * times:.2g}{unit} +- {one.half * times:.2g}"
-            yield f"the tracks do not tell {surface}.{key} ({value}): it is left out"
+            yield f"the tracks do not determine {surface}.{key} ({value}): it is left out"
 
 
 def _yaml(found: Result, tracks: list[Track]) -> Iterator[str]:
     yield f"# {found.points} points of {len(tracks)} tracks, {found.rebounds} rebounds; residuals of"
-    yield f"# {found.noise * 1e3:.2f} mm. Beside each value half of its interval of 95 % confidence."
+    yield f"# {found.noise * 1e3:.2f} mm. After each value half of its interval of 95 % confidence."
     known = {name: one for name, one in found.pairs.items() if one.is_known}
     if not known:
         yield "{}"

@@ -1,4 +1,4 @@
-"""How a ball goes on over a level floor between straight walls: in flights, slides and rolls, each of closed form.
+"""Motion of a ball over a level floor between straight walls: flights, slides and rolls, each in closed form.
 
 A sphere, I = 2/5 m r^2, with Coulomb's friction at floor and walls and Newton's restitution. Frame of reference: that
 of the table, x along, y across, z up; the ball's height is that of its lowest point over the floor. SI units. The
@@ -41,7 +41,7 @@ class Pairs(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Field:
     """Where the middle of a ball can be, |x| <= `x` and |y| <= `y` (m); the ball's radius (m); gravity (m/s2); and the
-    restitution of floor and ball, which is not fitted."""
+    fixed restitution of floor and ball."""
 
     x: float
     y: float
@@ -158,7 +158,7 @@ class _Ball:
         return found
 
     def go(self, time: float, ax: float, ay: float) -> None:
-        """Go on for a time."""
+        """Continue for a time."""
         field, radius = self._field, self._field.radius
         self.x += self.vx * time + 0.5 * ax * time * time
         self.y += self.vy * time + 0.5 * ay * time * time

@@ -1,7 +1,7 @@
 """Reads measured tracks of a ball from CSV.
 
 The header names the columns, each quantity with its unit: `time [s]`, `x [mm]`, `y [mm]`, or `time_s`, `x_mm`, `y_mm`;
-`t` stands for `time`. A column `track` tells tracks of one file apart; without one, a file is a track. Other columns
+`t` is short for `time`. A column `track` separates tracks of one file; without one, a file is a track. Other columns
 are passed over. Places are in the table's frame of reference.
 """
 
@@ -27,7 +27,7 @@ QUANTITIES: Final = {"time": units.TIME, "x": units.LENGTH, "y": units.LENGTH}
 ALIASES: Final = {"t": "time"}
 LINES_MAX: Final = 1_000_000
 POINTS_MIN: Final = 20
-"""A track with fewer points says little more than where it began."""
+"""A track with fewer points determines little more than its start."""
 TRACKS_MAX: Final = 50
 POINTS_MAX: Final = 20_000
 """The fit's time grows with more than the square of the tracks: 8 s for 10, 43 s for 25, a minute and more beyond."""
@@ -43,7 +43,7 @@ class BadTracks(Refused):
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A track: what it is called in messages, its file, its rows of time (s), x and y (m), and the line of each."""
+    """A track: its name in messages, its file, its rows of time (s), x and y (m), and the line of each."""
 
     name: str
     file: str
@@ -126,7 +126,7 @@ def _columns(header: Sequence[str], name: str) -> tuple[dict[str, _Column], int 
 
 
 def _factor(quantity: str, unit: str | None) -> float:
-    """Return what a unit is in SI units. Raises BadValue."""
+    """Return the value of a unit in SI units. Raises BadValue."""
     dimension = QUANTITIES[quantity]
     if unit is None:
         example = _example(quantity)
@@ -163,7 +163,7 @@ def _values(
 
 
 def usable(tracks: Sequence[Track], field: Field, ramps: float, goal: Goal) -> tuple[list[Track], list[str]]:
-    """Return the parts of tracks that are over the level floor, and what was left out, in words.
+    """Return the parts of tracks that are over the level floor, and messages about the rest.
 
     A track ends where it comes over a corner ramp (a right triangle with legs of `ramps`, m) or to a goal. Raises
     BadTracks where a place before that is off the field, a track is there twice, or nothing is left.

@@ -498,7 +498,7 @@ class Up:
         self._end_requested = True
         if self._lost is not None and self._control is not None:
             with suppress(Refused):
-                self._control.ask("down", QUESTION_S, lost=f"{self._lost.name}: it {self._lost.ending}")
+                self._control.request("down", QUESTION_S, lost=f"{self._lost.name}: it {self._lost.ending}")
                 return
         supervisor.process.send_signal(signal.SIGTERM)
 

@@ -40,13 +40,13 @@ class Windows:
         self._width = width
 
     def places(self, covered: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Places]:
-        """Return the covered pixels of the picture: whose each is, and which it is."""
+        """Return the covered pixels: the numbers of their shapes and of the pixels in the picture."""
         which, row, column = covered.nonzero()
         return which, self._row[which, row] * self._width + self._column[which, column]
 
 
 def covered_by_boxes(windows: Windows, sides: Numbers) -> NDArray[np.bool_]:
-    """Return which pixels boxes cover whose half sides are these, (n, 3, 2)."""
+    """Return which pixels are covered by boxes with these half sides, (n, 3, 2)."""
     covered: NDArray[np.bool_] | None = None
     for one in range(3):
         x, y = sides[:, one, 0], sides[:, one, 1]
@@ -62,7 +62,7 @@ def covered_by_boxes(windows: Windows, sides: Numbers) -> NDArray[np.bool_]:
 def covered_by_rounds(
     windows: Windows, along: Numbers, length: Numbers, radius: Numbers, flat: Numbers
 ) -> NDArray[np.bool_]:
-    """Return which pixels are covered by what is round.
+    """Return which pixels are covered by round shapes.
 
     `along` are unit vectors (n, 2), `length` half the segment's, seen from above; `flat` is how much of the radius an
     end rounds off along it: 1 of a sphere, and of a disc the sine of its tilt.

@@ -1,8 +1,8 @@
 """A frame from straight above, in parallel projection: a pure function of frame and scene, for any world.
 
-What is higher hides what is lower: of boxes, hulls and meshes that stand still by the height at each pixel, so that
-what is on a slope, or in a hall that is one mesh, is seen; of all else by the greatest height of each shape. Outlines
-are exact, but that of a mesh that moves is that of its hull. What stands still is painted once.
+Higher shapes hide lower ones: fixed boxes, hulls and meshes by the height at each pixel, so that a thing on a slope,
+or in a hall that is one mesh, is visible; others by their greatest height. Outlines are exact, but a moving mesh has
+the outline of its hull. Fixed shapes are painted once.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ PIXELS_MAX: Final = 8192
 BEYOND: Final = (24, 26, 30)
 """What is painted where nothing is: dark grey."""
 STANDING_M: Final = 0.05
-"""Scenery that is lower is ground: it does not say what is shown."""
+"""Lower scenery is ground: it does not widen the shown region."""
 MARGIN: Final = 1.02
 SIDE_M: Final = 10.0
-"""The side of what is shown of a world in which nothing stands."""
+"""The side of the shown region of an empty world."""
 
 
 class OverheadPainter:
@@ -40,9 +40,9 @@ class OverheadPainter:
     def __init__(
         self, scene: Scene, layout: Layout, pixels: tuple[int, int] = (320, 180), region: Region | None = None
     ) -> None:
-        """`pixels` are width and height. `region` is shown whole; by default, what stands in the world is.
+        """`pixels` are width and height. `region` is shown whole; by default it has all that stands in the world.
 
-        Raises BadValue for pixels or a region that are none.
+        Raises BadValue for invalid pixels or an invalid region.
         """
         width, height = pixels
         if not (1 <= width <= PIXELS_MAX and 1 <= height <= PIXELS_MAX):
@@ -75,7 +75,7 @@ class OverheadPainter:
         self._paint_still(still, poses)
 
     def _paint_still(self, still: Sequence[tuple[int, Shape]], poses: Sequence[Pose]) -> None:
-        """Paint what stands still, one shape after the other; of places at one height the later counts."""
+        """Paint fixed shapes, one after the other; at equal heights the later one counts."""
         for number, shape in still:
             one = covered_by_surface(shape, poses[number], self.view)
             if one is None:
@@ -107,7 +107,7 @@ class OverheadPainter:
 
 
 def _standing(scene: Scene) -> Region:
-    """Return the region of what stands, with a margin: scenery above the ground, else bodies on fixed bases."""
+    """Return the region of all that stands, with a margin: scenery above the ground, else bodies on fixed bases."""
     boxes = [shape_box(shape) for shape in scene.scenery]
     boxes = [box for box in boxes if box[1][2] > STANDING_M]
     if not boxes:

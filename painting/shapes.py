@@ -47,7 +47,7 @@ BOX_TRIANGLES: Final = np.array(
     np.int32,
 )
 LEVEL_DIGITS: Final = 6
-"""Heights of faces are rounded to so many digits of a metre: those at one level are at one height."""
+"""Heights of faces are rounded to this count of digits of a metre: faces at one level have one height."""
 
 
 class Covered(NamedTuple):
@@ -89,7 +89,7 @@ class Shapes:
         ]
 
     def covered(self, poses: Sequence[Pose], view: View) -> Covered:
-        """Return what the shapes cover, with their links at these poses."""
+        """Return the pixels that the shapes cover, with their links at these poses."""
         count = len(self._links)
         positions = np.array([position for _, position, _ in poses])[self._links]
         turned = np.array([orientation for _, _, orientation in poses])[self._links]
@@ -205,9 +205,9 @@ def _round_size(shape: Shape) -> tuple[float, float, float] | None:
 
 
 def covered_by_surface(shape: Shape, pose: Pose, view: View) -> Covered | None:
-    """Return what a shape whose link is at this pose covers, with the height of its surface at each pixel.
+    """Return the pixels that a shape with its link at this pose covers, with the height of its surface at each.
 
-    None of what is round.
+    None for round shapes.
     """
     corners, triangles = _faces(shape)
     if not len(triangles):

@@ -52,7 +52,7 @@ ONLY_IN = {
 # The files that touch the world. Every other module is a core: it gets messages and the time and returns what to do,
 # which is why rehearsal can run all of them in one process on virtual time.
 SHELLS = {
-    "client/asking.py",
+    "client/requests.py",
     "client/loading.py",
     "client/client.py",
     "client/main.py",

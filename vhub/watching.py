@@ -78,7 +78,7 @@ class WatchList:
         watched = {
             "drops": _newest(rows),
             "readings": _newest(readings),
-            "asked": _newest({"": asked})[""],
+            "events": _newest({"": asked})[""],
             "here": sorted(name for name, member in state.members.items() if member.active),
         }
         return {"watched": watched}

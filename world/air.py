@@ -19,9 +19,9 @@ Viscosity = Annotated[float, Quantity(units.VISCOSITY, "0 Pa s", "10 Pa s")]
 
 
 class WindSettings(RuleSettings):
-    """How fast the air goes in the world's frame, its density and its dynamic viscosity, by default those of air.
+    """The velocity of the air in the world's frame, its density and its dynamic viscosity, by default those of air.
 
-    These are the values that MuJoCo's documentation names for air. `x`, `y` and `z` can be set while the world goes on.
+    These are the values that MuJoCo's documentation names for air. `x`, `y` and `z` can be set during a run.
     """
 
     x: AirSpeed = default("0 m/s")

@@ -113,7 +113,7 @@ def control(
         if pki is None and place.pki:
             pki = Path(os.environ.get(PKI_VARIABLE) or place.pki)
     with hear_replay(address, (), pki=pki) as replay:
-        status = replay.ask(request, **arguments)
+        status = replay.request(request, **arguments)
     if json:
         print_json(status)
     else:

@@ -1,1 +1,1 @@
-"""The time of what a page shows, and two sources on one clock."""
+"""The clock of a page's sources, and the comparison of two."""

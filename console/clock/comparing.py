@@ -1,6 +1,6 @@
 """The distance between two sources on one clock, published point by point while it is computed.
 
-Of two recordings all of the time that both have is compared; of a source that has its own clock, what it shows while
+Of two recordings the common time is compared; of a source with its own clock, its moments while
 a browser looks.
 """
 
@@ -18,7 +18,7 @@ from foosim.console.clock.leading import Leader
 from foosim.console.shown.compare import Comparison, Course, Where, distances
 from foosim.console.shown.source import Feed
 
-TOLD_S: Final = 0.25
+PERIOD_S: Final = 0.25
 POINTS_AT_ONCE: Final = 20
 Open = Callable[[], Where]
 """Opens the compared source, in the thread of the comparison."""
@@ -31,7 +31,7 @@ Covers = Callable[[], tuple[int, int]]
 
 
 async def compare(feed: Feed, clock: Clock, one: Compare, other: Open, covers: Covers) -> None:
-    """Tell the feed of the distances between a clock's first source and another one, until it is cancelled."""
+    """Publish the distances between a clock's first source and another one, until cancelled."""
     pool = ThreadPoolExecutor(1, "compared")
     in_pool = partial(asyncio.get_running_loop().run_in_executor, pool)
     try:
@@ -41,9 +41,9 @@ async def compare(feed: Feed, clock: Clock, one: Compare, other: Open, covers: C
             assert isinstance(clock, Deck), "a recording is compared on a deck"
             contents = _on_deck(clock, Comparison(await in_pool(one), await in_pool(other), clock.tick_ns), in_pool)
         async for content in contents:
-            feed.tell({"type": "compared", "covers": covers(), **content})
+            feed.publish({"type": "compared", "covers": covers(), **content})
     except CaptureError as error:
-        feed.tell({"type": "note", "level": "error", "text": f"the comparison ends: {error}"})
+        feed.publish({"type": "note", "level": "error", "text": f"the comparison ends: {error}"})
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
@@ -63,7 +63,7 @@ async def _on_deck(deck: Deck, comparison: Comparison, in_pool: InPool) -> Async
         if now != contents or not comparison.is_complete:
             yield await in_pool(work, now[0])
             contents = now
-        await asyncio.sleep(TOLD_S if comparison.is_complete else 0)
+        await asyncio.sleep(PERIOD_S if comparison.is_complete else 0)
 
 
 async def _beside(leader: Leader, other: Where, in_pool: InPool) -> AsyncIterator[dict[str, Any]]:
@@ -77,4 +77,4 @@ async def _beside(leader: Leader, other: Where, in_pool: InPool) -> AsyncIterato
             compared_ns, gaps = seen[0], leader.gaps
             found = await in_pool(lambda time_ns, poses: distances(poses, other(time_ns)), *seen)
             yield course.take(compared_ns // leader.clock.tick_ns, found)
-        await asyncio.sleep(TOLD_S)
+        await asyncio.sleep(PERIOD_S)

@@ -14,7 +14,7 @@ from typing import Any, Final
 from foosim.common.errors import BadValue, show
 from foosim.common.names import nearest_name
 from foosim.console.clock.playhead import Playhead
-from foosim.console.shown.source import Answered, NotAsked
+from foosim.console.shown.source import Answered, InvalidRequest
 
 Known = Mapping[str, Mapping[str, tuple[type, ...]]]
 ARGUMENTS: Final[Known] = {
@@ -112,10 +112,12 @@ class Deck(Clock):
         head = self.playhead
         return {"state": "paused" if head.paused else "running", "pace": str(head.pace), "loop": head.loops}
 
-    def ask(self, verb: str, arguments: Mapping[str, Any], neighbour: Callable[[int, bool], int | None]) -> Answered:
-        """Do a request. `neighbour` gives the next tick, later or not, of which something is recorded.
+    def request(
+        self, verb: str, arguments: Mapping[str, Any], neighbour: Callable[[int, bool], int | None]
+    ) -> Answered:
+        """Execute a request. `neighbour` gives the next recorded tick, later or earlier.
 
-        Raises NotAsked for an unknown verb, BadValue for wrong arguments.
+        Raises InvalidRequest for an unknown verb, BadValue for wrong arguments.
         """
         checked(verb, arguments)
         head, now_ns = self.playhead, self.clock_ns()
@@ -157,11 +159,11 @@ class Deck(Clock):
 
 
 def checked(verb: str, arguments: Mapping[str, Any], known: Known = ARGUMENTS) -> None:
-    """Raise NotAsked for an unknown verb, BadValue for an argument that it does not have or of another type."""
+    """Raise InvalidRequest for an unknown verb, BadValue for an unknown argument or one of another type."""
     if verb not in known:
         nearest = nearest_name(verb, known)
         hint = "" if nearest is None else f", nearest is {nearest}"
-        raise NotAsked(f"no request of a recording, {show(verb)}: there are {', '.join(known)}{hint}")
+        raise InvalidRequest(f"a recording has no request {show(verb)}: valid are {', '.join(known)}{hint}")
     for name, value in arguments.items():
         types = known[verb].get(name)
         if types is None:
@@ -172,7 +174,7 @@ def checked(verb: str, arguments: Mapping[str, Any], known: Known = ARGUMENTS) -
 
 
 def needed(verb: str, arguments: Mapping[str, Any], name: str) -> Any:
-    """Return an argument that a verb has to have. Raises BadValue."""
+    """Return a required argument of a verb. Raises BadValue."""
     if name not in arguments:
         raise BadValue(f"{verb} needs {name}")
     return arguments[name]

@@ -15,7 +15,7 @@ from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, So
 
 
 class HeardClock(Clock):
-    """The time of the moment that was heard last; before the first one it is 0."""
+    """The time of the last received moment; before the first one it is 0."""
 
     def __init__(self, tick_ns: int, clock_ns: Callable[[], int]) -> None:
         super().__init__(tick_ns, clock_ns)
@@ -53,7 +53,7 @@ class Leader:
         self.source = source
         self.clock = HeardClock(tick_ns, clock_ns)
         self.gaps = 0
-        """How often moments were not heard, or not in their order: no browser looked, or time jumped."""
+        """The count of gaps in the moments: no browser looked, or time jumped."""
         self._is_looked_at = False
         self._places: dict[str, int] = {}
         """The rows of poses by the names of links, and by those of entities, whose last link it is."""
@@ -71,8 +71,8 @@ class Leader:
         self._is_looked_at = wanted.readers > 0
         self.source.want(wanted)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
-        return await self.source.ask(verb, arguments, who)
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        return await self.source.request(verb, arguments, who)
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         return await self.source.history(curve)
@@ -116,5 +116,5 @@ class _Overheard:
         self._feed.show(moment)
         self._leader.shown(moment)
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        self._feed.tell(message)
+    def publish(self, message: Mapping[str, Any]) -> None:
+        self._feed.publish(message)

@@ -33,7 +33,7 @@ class Playhead:
         """Wall time of it, while it plays."""
 
     def at(self, now_ns: int) -> float:
-        """Return the position, as a tick with a fraction; at its end a recording goes round, or is paused there."""
+        """Return the position, as a tick with a fraction; at its end a recording begins again or pauses."""
         return float(self._advance(now_ns))
 
     def tick(self, now_ns: int) -> int:
@@ -72,7 +72,7 @@ class Playhead:
         self._anchor(min(max(at, Fraction(first)), Fraction(last)), now_ns)
 
     def play(self, now_ns: int) -> None:
-        """Go on; at the end, from the beginning."""
+        """Play; at the end, from the beginning."""
         if not self.paused:
             return
         if self._at >= self.last:
@@ -81,7 +81,7 @@ class Playhead:
         self._anchor(self._at, now_ns)
 
     def pause(self, now_ns: int) -> None:
-        """Stand still, at a whole tick."""
+        """Pause, at a whole tick."""
         self._at, self.paused = Fraction(self.tick(now_ns)), True
 
     def seek(self, tick: int, now_ns: int) -> None:
@@ -103,7 +103,7 @@ class Playhead:
         self._at = Fraction(min(max(int(self._at) + count, self.first), self.last))
 
     def set_rate(self, text: str, now_ns: int) -> None:
-        """Go on at another rate. Raises BadValue: a page has no `fast`."""
+        """Continue at another rate. Raises BadValue: a page has no `fast`."""
         pace = parse_pace(text)
         if pace.kind == "fast":
             raise BadValue("rate: a recording is shown at realtime or a factor such as 8x", text)

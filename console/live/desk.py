@@ -1,4 +1,4 @@
-"""What the console, as a client of the run, has robots do: jobs that operators give by the page, and how they stand.
+"""Jobs of the console as a client of the run: operators give them by the page, which shows their states.
 
 It is used by one thread (`sending.py`), and knows neither browsers nor how the client has connected.
 """
@@ -25,14 +25,14 @@ WORDS: Final[Mapping[JobState, str]] = {
     JobState.PREEMPTED: "preempted",
     JobState.CANCELLED: "cancelled",
 }
-UNSENT: Final = "not sent: the robot's job sensor has not been heard"
+UNSENT: Final = "not sent: the robot's job sensor has not been received"
 
 
 class Desk:
     """The jobs of one connection. One that begins anew finds the last job of the one before."""
 
     def __init__(self, client: Client, deployment: Deployment, layout: Layout) -> None:
-        """Join, and hear all sensors that tell of jobs; `deployment` has the contents of its files."""
+        """Join, and receive all sensors that report jobs; `deployment` has the contents of its files."""
         self._client = client
         encoder = CommandEncoder(deployment)
         reported = {robot: jobs_of(deployment, robot) for robot in sorted(deployment.robots)}
@@ -48,7 +48,7 @@ class Desk:
     def send(self, robot: str, actuator: str, numbers: Mapping[str, Any]) -> str:
         """Give a job, by the numbers of a command; return the request in words. It preempts the one that runs.
 
-        Raises UnknownName for an actuator without jobs, BadValue for numbers that are none of a command or beyond its
+        Raises UnknownName for an actuator without jobs, BadValue for numbers that a command does not have or beyond its
         limits, NotJoined, RunEnded and ConnectionFailed.
         """
         taker = self._takers[self._found(robot, actuator)]
@@ -68,19 +68,19 @@ class Desk:
         return f"{robot}/{actuator}: {what}"
 
     def cancel(self, robot: str, actuator: str) -> str:
-        """Call the last job off; return what that is in words. Raises as `send`, BadValue where there is none."""
+        """Cancel the last job; return the request in words. Raises as `send`, BadValue without a job."""
         job = self._job(self._found(robot, actuator))
         if job is None or job.state.has_ended:
             raise BadValue(f"{robot}/{actuator}: no job of {self._client.name} to cancel")
         job.cancel()
-        return f"{robot}/{actuator}: job {job.number} is called off" if job.number else f"{robot}/{actuator}: not sent"
+        return f"{robot}/{actuator}: job {job.number} is cancelled" if job.number else f"{robot}/{actuator}: not sent"
 
     def turn(self) -> None:
-        """Receive for a moment, and send what is due. Raises RunEnded, NotJoined and ConnectionFailed."""
+        """Receive for a moment, and send due commands. Raises RunEnded, NotJoined and ConnectionFailed."""
         self._client.receive(AGAIN_S)
 
     def jobs(self) -> list[dict[str, Any]]:
-        """Return how the jobs stand, as pages read it: of each actuator with a job of this client."""
+        """Return the states of the jobs of this client, one for each actuator with a job, as pages read them."""
         found = ((pair, self._job(pair)) for pair in self._takers)
         return [self._reported(*pair, job) for pair, job in found if job is not None]
 
@@ -98,5 +98,5 @@ class Desk:
     def _found(self, robot: str, actuator: str) -> tuple[str, str]:
         if (robot, actuator) not in self._takers:
             valid = ["/".join(pair) for pair in self._takers]
-            raise UnknownName("no actuator whose jobs a sensor reports", f"{robot}/{actuator}", valid)
+            raise UnknownName("no actuator with a job sensor", f"{robot}/{actuator}", valid)
         return robot, actuator

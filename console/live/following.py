@@ -28,7 +28,7 @@ from foosim.protocol.messages import Commit
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame, frame_from_bytes
 
-ASKERS_KEPT: Final = 256
+REQUESTERS_KEPT: Final = 256
 _OWN_NAME: Final = re.compile(r"(operator|viewer)-([0-9]+)-[0-9a-f]{7}")
 _CERTIFIED: Final = re.compile(r"\.[0-9a-f]{7}$")
 LINKS_EVERY: Final = 2
@@ -38,7 +38,7 @@ Files = Callable[[Deployment], Mapping[str, bytes]]
 
 
 class World:
-    """The world of a run as it is known: how it is drawn, and what is kept of what was heard."""
+    """The known world of a run: its drawing, and the kept part of the received data."""
 
     def __init__(self, deployment: Deployment) -> None:
         self.drawing = Drawing(deployment)
@@ -46,13 +46,13 @@ class World:
         self.events, self.watched = WorldEvents(deployment), WatchList(deployment)
         self.history = History(deployment.tick_ns)
         self.planned = sorted(deployment.network.events, key=lambda event: event.at_ns, reverse=True)
-        """Events of the deployment's network that are not marked yet, the last one first."""
+        """Unmarked events of the deployment's network, the last one first."""
         self.newest: Frame | None = None
         """The newest frame that was shown."""
 
 
 def readable(name: str) -> str:
-    """Return an operator's name without what makes it unique: `operator (process 4711)`, or that of its certificate."""
+    """Return an operator's name without its unique part: `operator (process 4711)`, or that of its certificate."""
     alone = _OWN_NAME.fullmatch(name)
     return f"{alone[1]} (process {alone[2]})" if alone else _CERTIFIED.sub("", name)
 
@@ -72,7 +72,7 @@ class Following:
         """The requester of an event of the network, by the tick from which it applies."""
         self.stopped_by = ""
         """The requester of the run's end; empty without one."""
-        self._askers: OrderedDict[tuple[str, int, str], str] = OrderedDict()
+        self._requesters: OrderedDict[tuple[str, int, str], str] = OrderedDict()
         """The requesting browser, by the request's sender, tick and verb."""
 
     # --- the world ---------------------------------------------------------------------------------------------------
@@ -80,7 +80,7 @@ class Following:
     def world_of(self, what: Mapping[str, Any], files: Files) -> World:
         """Return the world of an answer to `describe`: the present one where it is the same.
 
-        It may take a while, and changes nothing: for a thread. Raises Refused for what cannot be read.
+        It may take a while, and changes nothing: for a thread. Raises Refused for unreadable content.
         """
         if self._world is not None and what["deployment"] == self._text:
             return self._world
@@ -90,7 +90,7 @@ class Following:
         world = World(deployment)
         if world.drawing.layout.digest.hex() != what["layout"]:
             raise Malformed(
-                f"run {what['run']} has another layout of its deployment: another version of foosim runs it"
+                f"run {what['run']} has another layout: another version of foosim runs it"
             )
         return world
 
@@ -114,7 +114,7 @@ class Following:
         if newest is not None and any(
             one.name == robot and one.is_absent(newest.numbers) for one in newest.layout.robots
         ):
-            raise BadValue("an absent robot does no jobs: add it first", robot)
+            raise BadValue("the robot is absent: add it first", robot)
 
     @property
     def _described(self) -> World:
@@ -132,7 +132,7 @@ class Following:
     # --- frames ------------------------------------------------------------------------------------------------------
 
     def show(self, payload: bytes) -> Moment | None:
-        """Return the moment of a commit; None of one that is not of this world."""
+        """Return the moment of a commit; None for a commit of another world."""
         world = self._world
         if world is None:
             return None
@@ -156,7 +156,7 @@ class Following:
         return [] if world is None or world.newest is None else world.drawing.overlays(world.newest, wanted)
 
     def listen(self, wanted: Wanted) -> None:
-        """Set what browsers watch from now on: nothing else is received."""
+        """Set the data that browsers watch from now on: nothing else is received."""
         self._wanted = wanted
         if self._world is not None:
             self._world.history.listen(wanted)
@@ -176,24 +176,24 @@ class Following:
         readings = [pair for pair in wanted.readings if pair[0] in robots and pair[1] in robots[pair[0]].sensors]
         return {"hz": min(wanted.hz, hz_max), "links": links, "readings": readings}
 
-    def asked(self, sender: str, tick: int, verb: str, who: str) -> None:
-        """Record which browser has sent a request."""
-        self._askers[sender, tick, verb] = who
+    def keep_requester(self, sender: str, tick: int, verb: str, who: str) -> None:
+        """Keep which browser has sent a request."""
+        self._requesters[sender, tick, verb] = who
         if verb == "down":
             self.stopped_by = who
-        if len(self._askers) > ASKERS_KEPT:
-            self._askers.popitem(last=False)
+        if len(self._requesters) > REQUESTERS_KEPT:
+            self._requesters.popitem(last=False)
 
     def take_status(self, status: dict[str, Any]) -> list[dict[str, Any]]:
-        """Return the messages that a status makes, itself among them."""
+        """Return the messages that follow from a status, itself among them."""
         world = self._described
         requests = [
-            {**asked, "who": self._askers.get((asked["who"], asked["tick"], asked["verb"]), readable(asked["who"]))}
-            for asked in status["requests"]
+            {**one, "who": self._requesters.get((one["who"], one["tick"], one["verb"]), readable(one["who"]))}
+            for one in status["requests"]
         ]
         status = {**status, "requests": requests}
-        self._disturbers = {asked["tick"]: asked["who"] for asked in requests if asked["verb"] == "network"}
-        self.stopped_by = next((asked["who"] for asked in requests if asked["verb"] == "down"), self.stopped_by)
+        self._disturbers = {one["tick"]: one["who"] for one in requests if one["verb"] == "network"}
+        self.stopped_by = next((one["who"] for one in requests if one["verb"] == "down"), self.stopped_by)
         was_paused, self._is_paused = self._is_paused, status["state"] == "paused"
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
@@ -222,7 +222,7 @@ class Following:
         return self._described.watched.drops(report, links, status["ticks"] * status["tick_ns"], self._disturbers)
 
     def standing_moment(self) -> Moment | None:
-        """Return the last moment again where the run has just paused or gone on, which pages show."""
+        """Return the last moment again where the run has just paused or resumed, which pages show."""
         world = self._world
         if not self._has_changed or world is None or world.newest is None:
             return None
@@ -231,7 +231,7 @@ class Following:
 
 
 def first_frame(drawing: Drawing, what: Mapping[str, Any]) -> Frame | None:
-    """Return the frame that a description has; before the first tick of a run from the start that is frame 0."""
+    """Return the frame of a description; before the first tick of a run from the start that is frame 0."""
     if what["frame"] is None:
         is_start = what["tick"] == 0
         return initial_frame(drawing.deployment) if is_start else None
@@ -244,7 +244,7 @@ def _frame_of(drawing: Drawing, commit: Commit) -> Frame:
 
 
 class StatusMarks:
-    """What is marked on the time line out of statuses: losses and returns, requests, each once."""
+    """Marks on the time line from statuses: losses and returns, requests, each once."""
 
     def __init__(self) -> None:
         self._recoveries = 0
@@ -258,7 +258,7 @@ class StatusMarks:
                 break  # it is marked when it has ended
             marks.append({"tick": entry["tick"], "kind": "recovery", "text": recovery_text(entry)})
             self._recoveries += 1
-        requests = [(asked["tick"], asked["verb"], asked["text"], asked["who"]) for asked in status["requests"]]
+        requests = [(one["tick"], one["verb"], one["text"], one["who"]) for one in status["requests"]]
         for tick, verb, text, who in requests:
             if (tick, verb, text, who) not in self._requests:
                 marks.append({"tick": tick, "kind": "request", "text": f"{who}: {text}"})

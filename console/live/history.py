@@ -25,15 +25,15 @@ FRAMES_BYTES: Final = 16 * 1024 * 1024
 STATUSES_BYTES: Final = 8 * 1024 * 1024
 LINKS_BYTES: Final = 8 * 1024 * 1024
 READINGS_MAX: Final = 64
-"""Channels of which readings are kept: the most recently received ones."""
+"""The count of channels with kept readings: the most recently received ones."""
 READINGS_BYTES: Final = 32 * 1024 * 1024 // READINGS_MAX
 ROW_BYTES: Final = 256
-"""Of a row beside its numbers."""
+"""Of a row in addition to its numbers."""
 
 Points = list[tuple[float, float]]
 Numbers = NDArray[np.floating[Any]]
 Row = tuple[int, Any, Numbers]
-"""The tick, what the numbers are, the numbers; empty where a gap precedes the next row."""
+"""The tick, the names of the numbers, the numbers; empty where a gap precedes the next row."""
 _HOLE: Final[Numbers] = np.empty(0)
 
 
@@ -74,7 +74,7 @@ class Rows:
         return self._rows[-1][1] if self._rows else None
 
     def reader(self, place_in: Callable[[Any], int | None], *, has_gaps: bool = False) -> Callable[[], Points]:
-        """Return what makes the points of one of the numbers of the rows that there are, in any thread.
+        """Return a function for the points of one number of the kept rows, for any thread.
 
         `place_in` gives its place from what the numbers of a row are. Not a number is the value of a hole; in a row it
         is a hole too where the rows have gaps, else no point.
@@ -110,7 +110,7 @@ class History:
         self._watched: Collection[Reading] = ()
 
     def listen(self, wanted: Wanted) -> None:
-        """Set what is received from now on: frames while a browser watches, readings that a browser plots."""
+        """Set the received data from now on: frames while a browser watches, readings that a browser plots."""
         if not (wanted.readers and wanted.hz):
             self._frames.interrupt()
         self._watched = wanted.readings  # readings of other viewers last as long as their lease
@@ -164,7 +164,7 @@ class History:
                 rows.keep(tick, reading, numbers)
 
     def reader(self, curve: Curve) -> Callable[[], Points]:
-        """Return what makes the points of a curve."""
+        """Return a function for the points of a curve."""
         if curve.field is not None:
             return self._frames.reader(lambda _: curve.field, has_gaps=True)
         if curve.status:

@@ -1,8 +1,8 @@
 """A running system as a source: frames of the simulation plane's `view`, statuses, and requests of an operator.
 
-Looking on costs the run what its leases say: they are renewed only while a browser looks; while none does, a status is
-requested each second. A supervisor that dies is looked for again under the run's name, and what was seen stays in sight
-meanwhile; pages get the reason of the end of a run. Requests wait in threads, one connection each, so that none
+Leases bound the cost of viewers for the run: they are renewed only while a browser looks; otherwise a status is
+requested each second. After a loss of the supervisor it is sought under the run's name, and the last view stays
+visible; pages get the reason of the end of a run. Requests wait in threads, one connection each, so that none
 waits for another's answer.
 """
 
@@ -36,7 +36,7 @@ VERBS: Final = (
 POLL_S: Final = 0.25
 """Period of status requests while a browser watches."""
 UNSEEN_S: Final = 1.0
-"""How often it is while none does: a page that is opened later scrolls back."""
+"""The period without a browser: a page that is opened later scrolls back."""
 RENEW_S: Final = 1.5
 QUESTION_S: Final = 3.0
 """How long a status is waited for; a supervisor that does not answer is looked for again."""
@@ -47,9 +47,9 @@ ENDED_S: Final = 5.0
 FRAMES_MAX: Final = 8
 """That may wait to be received."""
 HZ_MAX: Final = 100.0
-ASKS_AT_ONCE: Final = 4
+REQUESTS_AT_ONCE: Final = 4
 OUR_ARGUMENTS: Final = frozenset({"self", "verb", "timeout_s", "give_up"})
-"""Of `Control.ask`, which a page does not give."""
+"""Arguments of `Control.request` that a page does not set."""
 OVERLAY_S: Final = 0.1
 
 T = TypeVar("T")
@@ -84,7 +84,7 @@ class LiveSource:
         """Set when another subscription is needed."""
         self._closing = threading.Event()
         self._viewing = ThreadPoolExecutor(1, "console-view")
-        self._asking = ThreadPoolExecutor(ASKS_AT_ONCE, "console-ask")
+        self._requesting = ThreadPoolExecutor(REQUESTS_AT_ONCE, "console-request")
         self._idle: list[Control] = []
         """Idle connections."""
 
@@ -95,29 +95,29 @@ class LiveSource:
             self._sending.want(wanted.readers)
         self._changed.set()
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
-        """Ask the supervisor. Raises RequestRefused, NoAnswer, ConnectError, BadValue."""
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        """Send a request to the supervisor. Raises RequestRefused, NoAnswer, ConnectError, BadValue."""
         wrong = [key for key in arguments if not key.isidentifier() or key in OUR_ARGUMENTS]
         if wrong:
-            raise BadValue("no argument of a request", wrong[0])
+            raise BadValue("a request has no such argument", wrong[0])
         if verb in JOB_VERBS:
             assert self._sending is not None, "a source without these verbs gets no request"
             self._following.check_present(arguments.get("robot"))
-            return await self._sending.ask(verb, arguments)
+            return await self._sending.request(verb, arguments)
         loop = asyncio.get_running_loop()
-        answered, sender = await loop.run_in_executor(self._asking, self._ask, verb, dict(arguments))
-        self._following.asked(sender, answered.tick, verb, who)
+        answered, sender = await loop.run_in_executor(self._requesting, self._request, verb, dict(arguments))
+        self._following.keep_requester(sender, answered.tick, verb, who)
         self._changed.set()
         return answered
 
-    def _ask(self, verb: str, arguments: dict[str, Any]) -> tuple[Answered, str]:
+    def _request(self, verb: str, arguments: dict[str, Any]) -> tuple[Answered, str]:
         assert self._connect_operator is not None, "a source without verbs gets no request"
         try:
             control = self._idle.pop()
         except IndexError:
             control = self._connect_operator(self._closing.is_set)
         try:
-            answer = control.ask(verb, give_up=self._closing.is_set, **arguments)
+            answer = control.request(verb, give_up=self._closing.is_set, **arguments)
         except NoAnswer:
             control.close()
             raise
@@ -143,22 +143,22 @@ class LiveSource:
                 except Refused as refused:
                     if trouble != str(refused):
                         trouble = str(refused)
-                        await self._say_away(feed, f"{self._name} is not there: {refused}; it is looked for")
+                        await self._report_away(feed, f"{self._name} is not reached: {refused}; reconnecting")
                     await asyncio.sleep(ENDED_S if self._has_ended else AGAIN_S)
                     continue
                 if trouble:
                     trouble, self._has_ended = "", False
-                    feed.tell(HERE)
-                    feed.tell(_note("info", f"connected to {self._name} again"))
+                    feed.publish(HERE)
+                    feed.publish(_note("info", f"connected to {self._name} again"))
                 try:
                     await self._follow(control, feed)
                 except Refused as refused:
                     trouble = str(refused)
-                    await self._say_away(feed, f"lost {self._name}: {refused}; it is looked for")
+                    await self._report_away(feed, f"lost {self._name}: {refused}; reconnecting")
                     self._forget_idle()
                     await asyncio.sleep(AGAIN_S)
                 except asyncio.CancelledError:
-                    self._closing.set()  # before the last question is waited for
+                    self._closing.set()  # before the wait for the last request
                     raise
                 finally:
                     await self._in_thread(control.close)
@@ -166,24 +166,24 @@ class LiveSource:
             self._closing.set()
             if sending is not None:
                 sending.cancel()
-            await self._say_ended(feed)  # `up` ends its console when the run has ended
+            await self._report_end(feed)  # `up` ends its console when the run has ended
             self._forget_idle()
             self._viewing.shutdown(wait=False)
-            self._asking.shutdown(wait=False)
+            self._requesting.shutdown(wait=False)
 
-    async def _say_away(self, feed: Feed, text: str) -> None:
+    async def _report_away(self, feed: Feed, text: str) -> None:
         """Report once that the run is away, or that it has ended."""
-        if not await self._say_ended(feed):
-            feed.tell(away(text))
-            feed.tell(_note("warning", text))
+        if not await self._report_end(feed):
+            feed.publish(away(text))
+            feed.publish(_note("warning", text))
 
-    async def _say_ended(self, feed: Feed) -> bool:
+    async def _report_end(self, feed: Feed) -> bool:
         """Report the end of the run, if it has ended; return whether it was reported."""
         if not self._has_ended:
             message = await self._in_thread(lambda: self._how_ended(self._following.stopped_by))
             if message is not None:
                 self._has_ended = True
-                feed.tell(message)
+                feed.publish(message)
         return self._has_ended
 
     def _forget_idle(self) -> None:
@@ -208,13 +208,13 @@ class LiveSource:
     async def _describe(self, control: Control, feed: Feed) -> None:
         """Request the description of the world, and publish its scene if that is new."""
 
-        def ask() -> tuple[dict[str, Any], World, Frame | None]:
+        def request() -> tuple[dict[str, Any], World, Frame | None]:
             what = control.describe(QUESTION_S, self._closing.is_set)
             files = partial(control.files, timeout_s=QUESTION_S, give_up=self._closing.is_set)
             world = self._following.world_of(what, files)
             return what, world, first_frame(world.drawing, what)
 
-        what, world, first = await self._in_thread(ask)
+        what, world, first = await self._in_thread(request)
         if self._following.turn_to(what, world):
             jobs = () if self._sending is None else self._sending.turn_to(world.drawing)
             self.about = replace(self._following.about, verbs=(*self._verbs, *jobs))
@@ -239,7 +239,7 @@ class LiveSource:
             if wanted.links:
                 messages += await self._in_thread(partial(following.explained, status, wanted))
             for message in messages:
-                feed.tell(message)
+                feed.publish(message)
             moment = following.standing_moment()
             if moment is not None:
                 feed.show(moment)
@@ -248,20 +248,20 @@ class LiveSource:
                     await self._changed.wait()
 
     async def _renew(self, control: Control, feed: Feed, wanted: dict[str, Any], is_new: bool) -> None:
-        """Begin or renew the lease; frames alone, where others watch so many links that there is no room for these."""
-        ask = partial(control.ask, "watch", QUESTION_S, self._closing.is_set)
+        """Begin or renew the lease; frames alone, where the links that others watch leave no room for more."""
+        watch = partial(control.request, "watch", QUESTION_S, self._closing.is_set)
         try:
-            await self._in_thread(partial(ask, **wanted))
+            await self._in_thread(partial(watch, **wanted))
         except RequestRefused as refused:
             if is_new:
-                feed.tell(_note("warning", str(refused)))
-            await self._in_thread(partial(ask, hz=wanted["hz"]))
+                feed.publish(_note("warning", str(refused)))
+            await self._in_thread(partial(watch, hz=wanted["hz"]))
 
     def _take_frame(self, feed: Feed, payload: bytes) -> None:
-        """Show a commit, and from time to time what lies over it."""
+        """Show a commit, and from time to time its overlays."""
         wanted = self._wanted
         if not wanted.readers:
-            return  # a lease is not over at once
+            return  # a lease ends after a while
         moment = self._following.show(payload)
         if moment is None:
             return
@@ -270,11 +270,11 @@ class LiveSource:
         if wanted.overlays and now_s >= self._overlay_s + OVERLAY_S:
             self._overlay_s = now_s
             for message in self._following.overlays(wanted.overlays):
-                feed.tell(message)
+                feed.publish(message)
 
 
 class _Newest(Inbox):
-    """An inbox that has the event loop take the newest frame: what came before it is old by then."""
+    """An inbox that has the event loop take the newest frame and drop older ones."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, take: Callable[[bytes], None]) -> None:
         super().__init__(FRAMES_MAX)

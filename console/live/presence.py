@@ -17,12 +17,12 @@ HERE = {"type": "presence", "state": "here", "text": ""}
 
 
 def away(text: str) -> dict[str, Any]:
-    """Return the message about a run whose supervisor is not reached, which is looked for."""
+    """Return the message about a run whose supervisor is not reached; the console tries again."""
     return {"type": "presence", "state": "away", "text": text}
 
 
 def how_ended(folder: RunFolder, stopped_by: str) -> dict[str, Any] | None:
-    """Return the message about a run that has a result; None for one that has not ended, or may be resumed.
+    """Return the message about a run that has a result; None for a run that continues or may be resumed.
 
     `stopped_by` is the requester of the end, if known.
     """

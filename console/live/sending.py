@@ -58,7 +58,7 @@ class Sending:
             self._is_wanted.set()
 
     async def run(self, feed: Feed) -> None:
-        """Send and receive, and tell the feed of all changes, until cancelled."""
+        """Send and receive, and publish all changes, until cancelled."""
         last: dict[str, Any] = {}
         try:
             while True:
@@ -66,7 +66,7 @@ class Sending:
                 message = await self._in_thread(self._turn)
                 if message != last:
                     last = message
-                    feed.tell(message)
+                    feed.publish(message)
                 if message["problem"]:
                     self._is_wanted.clear()
                     with suppress(TimeoutError):
@@ -77,9 +77,9 @@ class Sending:
             self._thread.submit(self._leave)
             self._thread.shutdown(wait=False)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any]) -> Answered:
+    async def request(self, verb: str, arguments: Mapping[str, Any]) -> Answered:
         """Give a job, or cancel one. Raises Refused with the reason."""
-        answered = await self._in_thread(lambda: self._ask(verb, dict(arguments)))
+        answered = await self._in_thread(lambda: self._request(verb, dict(arguments)))
         self._is_wanted.set()
         return answered
 
@@ -88,7 +88,7 @@ class Sending:
 
     # --- in the thread -----------------------------------------------------------------------------------------------
 
-    def _ask(self, verb: str, arguments: dict[str, Any]) -> Answered:
+    def _request(self, verb: str, arguments: dict[str, Any]) -> Answered:
         wanted = {"robot": str, "actuator": str, **({"numbers": dict} if verb == "send" else {})}
         if {name: type(value) for name, value in arguments.items()} != wanted:
             raise BadValue(f"{verb} takes {', '.join(wanted)}", arguments)
@@ -105,7 +105,7 @@ class Sending:
             try:
                 self._client = self._join(deployment.console)
             except Refused as refused:
-                raise Failed(f"this console cannot send robots, it is not connected: {refused}") from None
+                raise Failed(f"this console cannot send robots, its client is not connected: {refused}") from None
             self._desk = Desk(self._client, deployment, self._drawing.layout)
         return self._desk
 

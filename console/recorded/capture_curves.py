@@ -21,7 +21,7 @@ from foosim.world.forms.payloads import PayloadCodec
 
 
 def status_at(recording: Recording, account: Mapping[str, Any], tick: int, look: Look | None) -> dict[str, Any]:
-    """Return the status at a tick, of which `look` is what is shown; `account` is the state of the clock."""
+    """Return the status at a tick with the view `look`; `account` is the state of the clock."""
     about, deployment = recording.about, recording.deployment
     first, last = recording.span
     epoch = recording.epoch_at(tick)
@@ -118,7 +118,7 @@ def _status(history: CaptureHistory, curve: Curve, tick: int) -> float | None:
 def reading_points(
     history: CaptureHistory, robot: str, channel: str, after_ns: int, until_ns: int
 ) -> list[tuple[int, list[float]]]:
-    """Return what a robot sent on a channel in a time: tick and numbers of each reading. Raises CaptureError."""
+    """Return the readings of a robot on a channel in a time: tick and numbers of each. Raises CaptureError."""
     recording = history.recording
     try:
         codec = channel_codec(recording.deployment, robot, channel)

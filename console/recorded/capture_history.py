@@ -1,7 +1,7 @@
 """What happened in a capture, read in slices so that others get their turn: marks, and each link's windows.
 
 The rows are read topic by topic, the few ones first; of a capture that grows, from where the last pass ended. All of it
-belongs to one thread, and so does the `Recording` that it reads. Pure: the caller says how much a slice is.
+belongs to one thread, and so does the `Recording` that it reads. Pure: the caller sets the size of a slice.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from foosim.console.shown.timeline import Mark, Timeline
 from foosim.vhub.stages.explanation import Evidence
 
 SLICE_ROWS: Final = 500
-TOLD_MAX: Final = 1024
+EXPLAINED_MAX: Final = 1024
 """Drops whose explanations are kept."""
 PACKETS_MAX: Final = 10_000_000
-"""Packets whose times are kept: some hundred MB. Later ones are in no window, which a note reports."""
+"""Packets with kept times: some hundred MB. Windows lack later ones, which a note reports."""
 
 
 class CaptureHistory:
@@ -40,11 +40,11 @@ class CaptureHistory:
         self.links = LinkHistory(recording.tick_ns)
         self.timeline = Timeline(recording.deployment)
         self._done: dict[str, int] = dict.fromkeys((EPOCHS, RECOVERIES, TICK, FRAME, PACKETS), 0)
-        self._asked: list[tuple[int, str]] = []
+        self._requested: list[tuple[int, str]] = []
         """Requested events of the network, by tick."""
         versions, frame = recording.about.versions, recording.frame_up_to
-        self._evidence = Evidence(recording.deployment, versions, self._asked, frame, self._clients)
-        self._told: dict[int, Explained] = {}
+        self._evidence = Evidence(recording.deployment, versions, self._requested, frame, self._clients)
+        self._explained: dict[int, Explained] = {}
         self._rules = RuleTexts(recording.deployment)
         self._generation = recording.index.generation
 
@@ -56,7 +56,7 @@ class CaptureHistory:
 
     @property
     def share(self) -> float:
-        """How much of what there is was read, 0 to 1."""
+        """The share of the rows that was read, 0 to 1."""
         rows = sum(self._there(topic) for topic in self._done)
         return sum(self._done.values()) / rows if rows else 1.0
 
@@ -94,7 +94,7 @@ class CaptureHistory:
             tick = recording.decoded(TICK_MARKS, recording.index.read(topic, number))
             if tick.edits:
                 self.timeline.take_edits(tick.tick, tick.edits)
-                self._asked += network_events(tick)
+                self._requested += network_events(tick)
         elif topic == FRAME:
             frame = recording.frame(number)
             assert frame is not None
@@ -117,18 +117,18 @@ class CaptureHistory:
         return row
 
     def watched(self, source: str, destination: str, at_ns: int) -> dict[str, Any]:
-        """Return the last drops of a link up to a time, each explained: what `watched` says. Raises CaptureError."""
+        """Return the last drops of a link up to a time, each explained (`watched`). Raises CaptureError."""
         drops = []
         for number in self.links.last_drops(source, destination, at_ns):
             row = self.packet(number)
-            told = self._told.get(number) or explain_row(self._evidence, row)
-            if len(self._told) >= TOLD_MAX:
-                self._told.clear()
-            self._told[number] = told
+            explained = self._explained.get(number) or explain_row(self._evidence, row)
+            if len(self._explained) >= EXPLAINED_MAX:
+                self._explained.clear()
+            self._explained[number] = explained
             dropped_ns = row.sent_ns if row.arrival_tick < 0 else row.arrival_tick * self.recording.tick_ns
-            drops.append(drop_message(dropped_ns // self.recording.tick_ns, told))
-        asked = [asked for asked in self._asked if asked[0] <= at_ns // self.recording.tick_ns]
-        rule = self._rules.text(source, destination, at_ns, asked)
+            drops.append(drop_message(dropped_ns // self.recording.tick_ns, explained))
+        requested = [one for one in self._requested if one[0] <= at_ns // self.recording.tick_ns]
+        rule = self._rules.text(source, destination, at_ns, requested)
         return {"link": [source, destination], "rule": rule, "drops": drops}
 
     def _clients(self) -> list[Row]:

@@ -1,6 +1,6 @@
 """A capture as a source of the page: played, sought and stepped to the tick, with marks, links and drops at that time.
 
-Two threads read: one what is seen, so that the slider does not wait, one what happened, in slices. Each has the capture
+Two threads read: one the view, so that the slider does not wait, one the events, in slices. Each has the capture
 open by itself. A capture that is still being written is looked at again every second.
 """
 
@@ -42,14 +42,14 @@ LINKS_S: Final = 0.5
 OVERLAY_NS: Final = 100_000_000
 EARLY_NS: Final = 500_000
 REFRESH_S: Final = 1.0
-MARKS_TOLD: Final = 500
+MARKS_AT_ONCE: Final = 500
 """Of one message."""
 UNSEEN_HZ: Final = 2.0
 """Update period of a recording that no browser watches."""
 
 
 class FileSource:
-    """A capture file. Without a `clock` it has a deck of its own, and is what people ask for; with one it follows."""
+    """A capture file. Without a `clock` it has a deck of its own, which requests control; with one it follows."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class FileSource:
         recompute: Recompute | None = None,
         compare: Compare | None = None,
     ) -> None:
-        """`offset_ns`: this capture's time at time 0 of the clock. `compare`: what it is compared with.
+        """`offset_ns`: this capture's time at time 0 of the clock. `compare`: the other side of a comparison.
 
         Raises CaptureError.
         """
@@ -84,7 +84,7 @@ class FileSource:
         self._compare = compare
         self._ends = Links(self.recording.deployment, self.recording.drawing.entities)
         self._overlay_ns = 0
-        self._told_ns = 0
+        self._sent_ns = 0
         """Time up to which readings were published."""
         self._is_inexact = False
         """Whether frames between the captured ones cannot be computed."""
@@ -99,7 +99,7 @@ class FileSource:
         """Feed messages until cancelled; damage in the file is reported, and the rest is shown."""
         try:
             async with asyncio.TaskGroup() as tasks:
-                for work in (self._show, self._gather, self._tell_status, self._tell_links, self._refresh):
+                for work in (self._show, self._gather, self._publish_status, self._publish_links, self._refresh):
                     tasks.create_task(work(feed))
                 if self._compare is not None:
                     tasks.create_task(compare(feed, self.clock, self._compare, self.opened(), self.covers))
@@ -108,7 +108,7 @@ class FileSource:
                 pool.shutdown(wait=False, cancel_futures=True)
 
     def opened(self, *, links: bool = False) -> Callable[[], Where]:
-        """Return what opens the capture once more, for a comparison in a thread of its own."""
+        """Return a function that opens the capture once more, for a comparison in a thread of its own."""
         return lambda: Whereabouts(Recording(self.recording.path), self.offset_ns, links=links)
 
     def covers(self) -> tuple[int, int]:
@@ -120,7 +120,7 @@ class FileSource:
         return await asyncio.get_running_loop().run_in_executor(pool, work, *arguments)
 
     def tick(self) -> int:
-        """Return the own tick at the clock's time, within what there is."""
+        """Return the own tick at the clock's time, within the recording."""
         first, last = self.recording.span
         return min(max((self.clock.time_ns() + self.offset_ns) // self.recording.tick_ns, first), last)
 
@@ -136,10 +136,10 @@ class FileSource:
                 try:
                     look = await self._in(self._front, self.recording.look, tick)
                 except CaptureError as error:
-                    feed.tell({"type": "note", "level": "error", "text": str(error)})
+                    feed.publish({"type": "note", "level": "error", "text": str(error)})
                     look = None
                 if look is not None:
-                    self._tell_moment(feed, look, jump=clock.jumps != jumps)
+                    self._publish_moment(feed, look, jump=clock.jumps != jumps)
                     jumps = clock.jumps
                 shown = wish
                 if clock.paused and look is not None and look.kind != "frame":
@@ -158,11 +158,11 @@ class FileSource:
         if later is not None:
             wall_ns = self.clock.wall_ns(later * self.recording.tick_ns - self.offset_ns)
         soonest_ns = max(due_ns + period_ns * 9 // 10, now_ns + 1_000_000)
-        # A little behind its time: a timer that is early would find the frame before.
+        # A little after its time: an early timer would find the frame before.
         next_ns = now_ns + period_ns if wall_ns is None else wall_ns + EARLY_NS
         return min(max(soonest_ns, next_ns), now_ns + 10**9)
 
-    def _tell_moment(self, feed: Feed, look: Look, *, jump: bool) -> None:
+    def _publish_moment(self, feed: Feed, look: Look, *, jump: bool) -> None:
         self._look = look
         paused = self.clock.paused
         feed.show(Moment(look.tick, look.poses, look.values, jump, paused))
@@ -170,34 +170,34 @@ class FileSource:
         if self._wanted.overlays and look.frame is not None and (paused or now_ns >= self._overlay_ns):
             self._overlay_ns = now_ns + OVERLAY_NS
             for message in self.recording.drawing.overlays(look.frame, self._wanted.overlays):
-                feed.tell(message)
+                feed.publish(message)
 
     def _describe(self, feed: Feed) -> None:
         feed.describe(self.about, self.recording.drawing.content())
 
     async def _show_exactly(self, feed: Feed, look: Look) -> None:
         """Publish the recomputed frame of a tick without one, or the reason why it cannot be computed."""
-        if self._recompute is None or self._is_inexact or look.asked == look.tick == 0:
+        if self._recompute is None or self._is_inexact or look.requested == look.tick == 0:
             return
         try:
-            found = await self._in(self._front, self._start, look.asked)
+            found = await self._in(self._front, self._start, look.requested)
             if found is None:
                 return
             frame = await self._in(self._exact, self._recompute, *found)
         except Refused as error:
             self._is_inexact = True
-            text = f"ticks between captured frames are not computed again: {error}"
-            feed.tell({"type": "note", "level": "info", "text": text})
+            text = f"ticks between captured frames cannot be recomputed: {error}"
+            feed.publish({"type": "note", "level": "info", "text": text})
             return
         if frame is None:
             self._is_inexact = True
-            text = "this machine computes another world than the capture has: between captured frames the last is seen"
-            feed.tell({"type": "note", "level": "warning", "text": text})
+            text = "this machine's results differ from the capture's: ticks without a frame show the last captured one"
+            feed.publish({"type": "note", "level": "warning", "text": text})
         elif frame.tick == self.tick():
-            self._tell_moment(feed, self.recording.seen(look.asked, frame, "computed"), jump=False)
+            self._publish_moment(feed, self.recording.seen(look.requested, frame, "computed"), jump=False)
 
     def _start(self, tick: int) -> tuple[Frame, list[CapturedTick]] | None:
-        """Return the newest captured frame up to a tick, and what led from there to it."""
+        """Return the newest captured frame up to a tick, and the inputs of the ticks after it."""
         frame = self.recording.frame_up_to(tick)
         return None if frame is None else (frame, [*self.recording.inputs(frame.tick, tick)])
 
@@ -206,22 +206,22 @@ class FileSource:
     async def _gather(self, feed: Feed) -> None:
         """Read events, slice by slice, and publish the marks as they are found."""
         history = await self._in(self._back, self._open_history)
-        told = False
+        is_reported = False
         while True:
             try:
                 await self._in(self._back, history.gather)
             except CaptureError as error:
-                feed.tell({"type": "note", "level": "error", "text": str(error)})
+                feed.publish({"type": "note", "level": "error", "text": str(error)})
             self._history = history
             if history.is_complete:
                 marks = await self._in(self._back, history.news)
                 content = [{"tick": mark.tick, "kind": mark.kind, "text": mark.text} for mark in marks]
-                for start in range(0, len(content), MARKS_TOLD):
-                    feed.tell({"type": "marks", "marks": content[start : start + MARKS_TOLD]})
-                if history.left_packets and not told:
-                    text = f"{history.left_packets} packets at the end of the capture are in no figure of a link"
-                    feed.tell({"type": "note", "level": "warning", "text": text})
-                    told = True
+                for start in range(0, len(content), MARKS_AT_ONCE):
+                    feed.publish({"type": "marks", "marks": content[start : start + MARKS_AT_ONCE]})
+                if history.left_packets and not is_reported:
+                    text = f"the figures of links lack the last {history.left_packets} packets of the capture"
+                    feed.publish({"type": "note", "level": "warning", "text": text})
+                    is_reported = True
                 if history.recording.index.finished:
                     return
                 await asyncio.sleep(REFRESH_S)
@@ -231,14 +231,14 @@ class FileSource:
         return CaptureHistory(Recording(self.recording.path, (PACKETS, CLIENTS)))
 
     async def _refresh(self, feed: Feed) -> None:
-        """Take what was written to the file since; a capture that ends is not looked at any more."""
+        """Read the growing file until the capture is finished."""
         while not self.recording.index.finished:
             await asyncio.sleep(REFRESH_S)
             try:
                 if not await self._in(self._front, self.recording.refresh):
                     continue
             except CaptureError as error:
-                feed.tell({"type": "note", "level": "error", "text": str(error)})
+                feed.publish({"type": "note", "level": "error", "text": str(error)})
                 continue
             first, last = self.recording.span
             self.about = replace(self.about, span=(first, last))
@@ -247,7 +247,7 @@ class FileSource:
                 self._deck.changed()
             self._describe(feed)
 
-    async def _tell_status(self, feed: Feed) -> None:
+    async def _publish_status(self, feed: Feed) -> None:
         before: Mapping[str, Any] | None = None
         while True:
             history = self._history
@@ -258,11 +258,11 @@ class FileSource:
                 at_ns = self.tick() * self.recording.tick_ns
                 status["packets"] = await self._in(self._back, history.links.totals, at_ns)
             if status != before:
-                feed.tell({"type": "status", "status": status})
+                feed.publish({"type": "status", "status": status})
                 before = status
             await asyncio.sleep(STATUS_S)
 
-    async def _tell_links(self, feed: Feed) -> None:
+    async def _publish_links(self, feed: Feed) -> None:
         """Publish the links' figures of the window up to now, the last drops of watched links, and readings."""
         before: Any = None
         while True:
@@ -271,24 +271,24 @@ class FileSource:
             if history is not None and key != before:
                 try:
                     for message in await self._in(self._back, self._link_messages, history, at):
-                        feed.tell(message)
+                        feed.publish(message)
                 except CaptureError as error:
-                    feed.tell({"type": "note", "level": "error", "text": str(error)})
+                    feed.publish({"type": "note", "level": "error", "text": str(error)})
                 before = key
             await asyncio.sleep(LINKS_S)
 
     def _link_messages(self, history: CaptureHistory, tick: int) -> list[dict[str, Any]]:
         at_ns = tick * self.recording.tick_ns
-        goes_on = at_ns - WINDOW_NS < self._told_ns <= at_ns
+        continues = at_ns - WINDOW_NS < self._sent_ns <= at_ns
         drops = [
             {"from": key[0], "to": key[1], "cause": cause, "where": lost_where(cause), "count": count}
-            for key, cause, count in history.links.drops(self._told_ns if goes_on else at_ns - WINDOW_NS, at_ns)
+            for key, cause, count in history.links.drops(self._sent_ns if continues else at_ns - WINDOW_NS, at_ns)
         ]
         frame = history.recording.frame_up_to(tick)
         if frame is not None:
             self._ends.move(frame)
         links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
-        told: list[dict[str, Any]] = [
+        messages: list[dict[str, Any]] = [
             {
                 "type": "links",
                 "at": tick,
@@ -299,24 +299,24 @@ class FileSource:
             }
         ]
         for source, destination in self._wanted.links:
-            told.append({"type": "watched", **history.watched(source, destination, at_ns)})
-        after_ns = self._told_ns if goes_on else at_ns - WINDOW_NS // 10
-        self._told_ns = at_ns
+            messages.append({"type": "watched", **history.watched(source, destination, at_ns)})
+        after_ns = self._sent_ns if continues else at_ns - WINDOW_NS // 10
+        self._sent_ns = at_ns
         for robot, channel in self._wanted.readings:
             points = reading_points(history, robot, channel, after_ns, at_ns)
             if points:
-                told.append({"type": "readings", "robot": robot, "channel": channel, "points": points})
-        return told
+                messages.append({"type": "readings", "robot": robot, "channel": channel, "points": points})
+        return messages
 
     # --- requests ----------------------------------------------------------------------------------------------------
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         if verb == BRANCH or self._deck is None:
             checked(verb, arguments, {BRANCH: {"tick": (int,)}})
             tick = arguments.get("tick", self.tick())
             return await self._in(self._front, branch_answer, self.recording, tick)
         checked(verb, arguments, {**ARGUMENTS, BRANCH: {}})
-        return self._deck.ask(verb, arguments, lambda tick, later: self.recording.neighbour(tick, later=later))
+        return self._deck.request(verb, arguments, lambda tick, later: self.recording.neighbour(tick, later=later))
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         name, unit = name_and_unit(curve)

@@ -95,7 +95,7 @@ class LinkHistory:
         self._links: dict[LinkKey, LinkRecord] = {}
 
     def add(self, mark: PacketMark, number: int) -> int:
-        """Count a packet, whose row has this number; return when it was dropped (ns), -1 when it was not."""
+        """Count a packet by the number of its row; return the time of its drop (ns), -1 for a delivered one."""
         key = mark.source, mark.destination, link_name(mark.rule, mark.radio)
         record = self._links.get(key)
         if record is None:
@@ -112,12 +112,12 @@ class LinkHistory:
         return -1
 
     def windows(self, at_ns: int, window_ns: int, only: tuple[str, str] | None = None) -> list[dict[str, Any]]:
-        """Return what each link (or only that between two ends) did in the time up to `at_ns`, by name.
+        """Return the figures of each link (or only that between two ends) in the time up to `at_ns`, by name.
 
         Links that were not used by then are left out.
 
-        `delay_ms` is the mean of what arrived in the window (null for nothing), `queue_ms` what the newest packet
-        waited, `loss` the share of what was decided.
+        `delay_ms` is the mean of the arrivals in the window (null for none), `queue_ms` the wait of the newest packet
+        in the queue, `loss` the lost share of packets with a fate.
         """
         found = []
         for (source, destination, rule), record in sorted(self._links.items()):
@@ -167,7 +167,7 @@ class LinkHistory:
         }
 
     def drops(self, after_ns: int, until_ns: int) -> list[tuple[LinkKey, str, int]]:
-        """Return what was dropped in a time: link, cause and how many."""
+        """Return the drops in a time: link, cause and count."""
         return [
             (key, cause, count)
             for key, record in sorted(self._links.items())

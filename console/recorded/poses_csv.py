@@ -1,7 +1,7 @@
 """Recorded poses as a table of text: the reality that a simulation is compared with, as motion capture writes it.
 
 The first line names the columns, in any order; the separator is a comma, a semicolon or a tab, and lines that begin
-with `#` are passed by. What `foosim capture export CAPTURE --what poses` writes is such a table.
+with `#` are passed by. `foosim capture export CAPTURE --what poses` writes such a table.
 
 | column | what | unit |
 |---|---|---|
@@ -44,7 +44,7 @@ NS_MAX: Final = 2**62
 
 
 class BadPoses(Refused):
-    """A table of poses that cannot be read: file, line, what is wrong and what is valid."""
+    """An unreadable table of poses: file, line, the problem and valid content."""
 
     exit_code = 2
 
@@ -75,7 +75,7 @@ class _Table:
             missing = ", ".join(sorted({*QUATERNION} - {*self._turn}))
             raise BadPoses(f"{place}: an orientation needs {', '.join(QUATERNION)}; {missing} is missing")
         if len(self._turn) > 1 and self._turn[0] in YAWS:
-            raise BadPoses(f"{place}: one orientation, not {', '.join(self._turn)}")
+            raise BadPoses(f"{place}: several orientations; give one of {', '.join(self._turn)}")
 
     def _one(self, what: str, names: Iterable[str]) -> str:
         """Return the name of the one column of these names. Raises BadPoses."""
@@ -83,7 +83,7 @@ class _Table:
         if len(found) == 1:
             return found[0]
         if found:
-            raise BadPoses(f"{self._place}: one column for {what}, not {' and '.join(found)}")
+            raise BadPoses(f"{self._place}: several columns for {what}; give one of {' and '.join(found)}")
         close = [nearest for name in self._columns if (nearest := nearest_name(name, [*names])) is not None]
         columns = ", ".join(name for name in self._columns if name) or "none"
         hint = f", nearest is {close[0]}" if close else ""
@@ -128,7 +128,7 @@ class _Table:
             return [0.0, 0.0, sin(angle / 2), cos(angle / 2)]
         length = hypot(*numbers)
         if abs(length - 1.0) > LENGTH_OFF:
-            raise BadPoses(f"{place}: a quaternion of length {length:.4g}, it has 1")
+            raise BadPoses(f"{place}: a quaternion of length {length:.4g}; expected 1")
         return [number / length for number in numbers]
 
 
@@ -159,9 +159,9 @@ def read_tracks(lines: Iterable[str], name: str) -> dict[str, Track]:
         samples.times.append(time_ns)
         samples.poses.extend(pose)
     if table is None:
-        raise BadPoses(f"{name}: it is empty, the first line names the columns")
+        raise BadPoses(f"{name}: the file is empty; the first line names the columns")
     if not found:
-        raise BadPoses(f"{name}: no line after that of the columns")
+        raise BadPoses(f"{name}: no line after the header")
     return {entity: _track(samples) for entity, samples in sorted(found.items())}
 
 

@@ -1,4 +1,4 @@
-"""Recorded poses as a source of the page: a recorded reality, beside or as a ghost in what a capture has.
+"""Recorded poses as a source of the page: a recorded reality, beside a capture or as a ghost in it.
 
 What has the name of a link or an entity of the other source is drawn as that; all else is a small sphere.
 """
@@ -19,7 +19,7 @@ from foosim.console.clock.deck import VERBS, Clock, Deck
 from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.poses_csv import BadPoses, read_tracks
 from foosim.console.shown.scene_json import scene_content
-from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, NotAsked, Wanted
+from foosim.console.shown.source import About, Answered, Curve, Feed, InvalidRequest, Moment, Wanted
 from foosim.console.shown.tracks import Pose, Track
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import build_scene
@@ -32,7 +32,7 @@ MARKER_COLOUR: Final = (0.9, 0.6, 0.1, 1.0)
 UNSEEN_HZ: Final = 2.0
 BYTES_MAX: Final = 4 * 1024**3
 NOWHERE: Final = (nan,) * 7
-"""The pose of a link that has none at a time."""
+"""The pose of a link without one at a time."""
 
 
 def load_tracks(path: Path) -> dict[str, Track]:
@@ -90,7 +90,7 @@ class PosesSource:
         self.clock.changed()
 
     def where(self, time_ns: int) -> dict[str, Pose]:
-        """Return what is known at a time of the clock, by name."""
+        """Return the known poses at a time of the clock, by name."""
         found = {name: track.at(time_ns + self.offset_ns) for name, track in self.tracks.items()}
         return {name: pose for name, pose in found.items() if pose is not None}
 
@@ -118,17 +118,17 @@ class PosesSource:
             period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
             await clock.wait(None if clock.paused else clock.clock_ns() + period_ns, seen)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         if self._deck is None:
-            raise NotAsked("recorded poses follow the first source: ask that one")
-        return self._deck.ask(verb, arguments, lambda tick, later: tick + (1 if later else -1))
+            raise InvalidRequest("recorded poses follow the first source: send the request to that one")
+        return self._deck.request(verb, arguments, lambda tick, later: tick + (1 if later else -1))
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         return "", "", []
 
 
 def _scene(tracks: Mapping[str, Track], deployment: Deployment | None) -> dict[str, Any]:
-    """Return the scene of what a table has: shapes of a deployment where names are its own, markers for the rest."""
+    """Return the scene of a table: shapes of the deployment's entities, markers for other names."""
     links: list[dict[str, Any]] = []
     models: dict[str, str] = {}
     known: dict[str, dict[str, Any]] = {}

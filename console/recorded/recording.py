@@ -1,7 +1,7 @@
 """Random access to a capture's world: its state at any tick, as exactly as the capture has it.
 
 At a tick there may be a captured frame, which is the world to the last bit, or captured poses alone; else what was
-captured last before it holds. `Look.kind` says which.
+captured last before it holds. `Look.kind` is which.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ from foosim.world.frame import Frame
 TOPICS: Final = (EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, POSES)
 Kind = Literal["frame", "poses", "computed", "held"]
 """What is seen at a tick: its captured frame, its captured poses, its frame computed again from the captured inputs and
-equal in its digest, or what was captured last before it."""
+equal in its digest, or the last captured one before it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is seen at a requested tick. `tick` is that of what is shown, `frame` the newest up to it."""
+    """The view at a requested tick. `tick` is the one shown, `frame` the newest up to it."""
 
-    asked: int
+    requested: int
     tick: int
     kind: Kind
     poses: NDArray[np.float32]
     frame: Frame | None
     values: NDArray[np.float64]
-    """The numbers of that frame that are shown; not a number where there is none yet."""
+    """The shown numbers of that frame; NaN before the first."""
 
 
 class Recording:
@@ -79,7 +79,7 @@ class Recording:
 
     @property
     def span(self) -> tuple[int, int]:
-        """First and last tick that it has, (0, 0) while it has none."""
+        """First and last tick, (0, 0) while it is empty."""
         times = self.index.places[TICK].log_ns or self.index.places[FRAME].log_ns
         return (times[0] // self.tick_ns, times[-1] // self.tick_ns) if times else (0, 0)
 
@@ -107,13 +107,13 @@ class Recording:
         return self.decoded(DECODERS[topic], self.index.read(topic, number))
 
     def decoded(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
-        """Return what a decoder makes of a message. Raises CaptureError."""
+        """Return a message decoded. Raises CaptureError."""
         return row_of(decoder, message, f"{self.path}: ")
 
     # --- the world at a tick -----------------------------------------------------------------------------------------
 
     def look(self, tick: int) -> Look | None:
-        """Return what is seen at a tick, None while there is nothing. Raises CaptureError for what is damaged."""
+        """Return the view at a tick, None while the capture is empty. Raises CaptureError for damaged records."""
         time_ns = tick * self.tick_ns
         frame = self.frame(self.index.places[FRAME].newest(time_ns))
         number = self.index.places[POSES].newest(time_ns)
@@ -126,7 +126,7 @@ class Recording:
         return Look(tick, posed, "poses" if posed == tick else "held", self._poses(number), frame, values)
 
     def seen(self, tick: int, frame: Frame, kind: Kind) -> Look:
-        """Return what is seen of a frame."""
+        """Return the view of a frame."""
         return Look(tick, frame.tick, kind, self.drawing.poser.poses(frame.values), frame, self.shown(frame))
 
     def shown(self, frame: Frame) -> NDArray[np.float64]:
@@ -148,7 +148,7 @@ class Recording:
         return self.frame(self.index.places[FRAME].newest(tick * self.tick_ns))
 
     def neighbour(self, tick: int, *, later: bool) -> int | None:
-        """Return the next tick after, or before, one with a captured frame or poses; None where there is none."""
+        """Return the next tick after or before one with a captured frame or poses; None beyond the last."""
         found = []
         for topic in (FRAME, POSES):
             places = self.index.places[topic]
@@ -163,12 +163,12 @@ class Recording:
         return self.drawing.known({pose.link: (pose.position, pose.orientation) for pose in poses})
 
     def inputs(self, after: int, until: int) -> Iterator[CapturedTick]:
-        """Yield what led to the ticks after one, up to another. Raises CaptureError where one is missing."""
+        """Yield the inputs of the ticks after one, up to another. Raises CaptureError where one is missing."""
         places = self.index.places[TICK]
         for tick in range(after + 1, until + 1):
             number = places.newest(tick * self.tick_ns)
             if number < 0 or places.log_ns[number] != tick * self.tick_ns:
-                raise CaptureError(f"{self.path}: tick {tick} is not there")
+                raise CaptureError(f"{self.path}: tick {tick} is missing")
             yield captured_tick(self.row(TICK, number))
 
     def epoch_at(self, tick: int) -> EpochRow | None:

@@ -41,7 +41,7 @@ ROW_MARKS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
     "recoveries": lambda row: f"{row['what']} {row['name']}: {row['reason']}",
 }
 """The texts of rows that are marks."""
-Ask = tuple[str, Mapping[str, Any], "Future[dict[str, Any]]"]
+Request = tuple[str, Mapping[str, Any], "Future[dict[str, Any]]"]
 
 
 class PlayedSource:
@@ -59,7 +59,7 @@ class PlayedSource:
         self._drawing: Final = Drawing(deployment)
         self._numbers: Final = np.full(self._drawing.layout.size, np.nan)
         self._jumps = 0
-        self._asked: queue.SimpleQueue[Ask] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
         self._ended = threading.Event()
 
     @property
@@ -68,31 +68,31 @@ class PlayedSource:
         return self._replay.deployment
 
     def close(self) -> None:
-        """End the connection of a source that is not to run."""
+        """Close the connection of a source that will not run."""
         self._replay.close()
 
     def want(self, wanted: Wanted) -> None:
-        """A replay sends what it sends, however many look."""
+        """A replay sends the same for any number of browsers."""
 
     async def run(self, feed: Feed) -> None:
         feed.describe(self.about, self._drawing.content())
         loop = asyncio.get_running_loop()
         heard = loop.create_future()
 
-        def tell(work: Callable[[], None]) -> None:
+        def in_loop(work: Callable[[], None]) -> None:
             loop.call_soon_threadsafe(work)
 
         def listen() -> None:
             try:
-                self._listen(feed, tell)
+                self._listen(feed, in_loop)
             except Refused as error:
                 text = str(error)
-                tell(lambda: feed.tell({"type": "note", "level": "warning", "text": text}))
+                in_loop(lambda: feed.publish({"type": "note", "level": "warning", "text": text}))
             finally:
                 self._ended.set()
                 self._refuse_all()
                 self._replay.close()
-                tell(lambda: None if heard.done() else heard.set_result(None))
+                in_loop(lambda: None if heard.done() else heard.set_result(None))
 
         thread = threading.Thread(target=listen, name="replay", daemon=True)
         thread.start()
@@ -102,16 +102,16 @@ class PlayedSource:
             self._ended.set()
             await asyncio.to_thread(thread.join)
 
-    def _listen(self, feed: Feed, tell: Callable[[Callable[[], None]], None]) -> None:
+    def _listen(self, feed: Feed, in_loop: Callable[[Callable[[], None]], None]) -> None:
         """Receive and send requests until the replay or this source ends. Raises Refused."""
         while not self._ended.is_set():
-            ended = self._replay.ended  # what was heard while something was asked waits for the next `take`
+            ended = self._replay.ended  # what arrives during a request waits for the next `take`
             for item in self._replay.take(HEAR_S):
-                tell(lambda item=item: self._tell(feed, item))  # type: ignore[misc]
-            while not self._asked.empty():
-                verb, arguments, answer = self._asked.get()
+                in_loop(lambda item=item: self._publish(feed, item))  # type: ignore[misc]
+            while not self._requests.empty():
+                verb, arguments, answer = self._requests.get()
                 try:
-                    answer.set_result(self._replay.ask(verb, **arguments))
+                    answer.set_result(self._replay.request(verb, **arguments))
                 except Refused as error:
                     answer.set_exception(error)
             if ended:
@@ -119,11 +119,11 @@ class PlayedSource:
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
-    def _tell(self, feed: Feed, item: Any) -> None:
+    def _publish(self, feed: Feed, item: Any) -> None:
         if isinstance(item, PlayedPoses):
             self._show(feed, item)
         elif isinstance(item, ReplayClock):
-            self._tell_status(feed, item)
+            self._publish_status(feed, item)
         elif isinstance(item, PlayedLine) and item.level != "info":
             self._mark(feed, item.time_ns, item.level, item.text)
         elif isinstance(item, PlayedRow) and item.topic in ROW_MARKS:
@@ -131,7 +131,7 @@ class PlayedSource:
             self._mark(feed, item.time_ns, item.topic.removesuffix("s"), text)
 
     def _mark(self, feed: Feed, time_ns: int, kind: str, text: str) -> None:
-        feed.tell({"type": "marks", "marks": [{"tick": time_ns // self.tick_ns, "kind": kind, "text": text}]})
+        feed.publish({"type": "marks", "marks": [{"tick": time_ns // self.tick_ns, "kind": kind, "text": text}]})
 
     def _show(self, feed: Feed, heard: PlayedPoses) -> None:
         link = self._replay.captured_link
@@ -142,11 +142,11 @@ class PlayedSource:
         feed.show(Moment(heard.time_ns / self.tick_ns, poses, self._numbers, jumps != self._jumps, paused))
         self._jumps = jumps
 
-    def _tell_status(self, feed: Feed, clock: ReplayClock) -> None:
+    def _publish_status(self, feed: Feed, clock: ReplayClock) -> None:
         tick = clock.time_ns // self.tick_ns
         assert self.about.span is not None
         first, last = self.about.span
-        feed.tell(
+        feed.publish(
             {
                 "type": "status",
                 "status": {
@@ -165,7 +165,7 @@ class PlayedSource:
 
     # --- requests ----------------------------------------------------------------------------------------------------
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         checked(verb, arguments, ARGUMENTS)
         if verb == "play":
             verb = "resume"
@@ -177,7 +177,7 @@ class PlayedSource:
         elif verb == "rate":
             content = {"pace": needed(verb, arguments, "pace")}
         answer: Future[dict[str, Any]] = Future()
-        self._asked.put((verb, content, answer))
+        self._requests.put((verb, content, answer))
         if self._ended.is_set():
             self._refuse_all()
         status = await asyncio.wrap_future(answer)
@@ -188,7 +188,7 @@ class PlayedSource:
         """Answer the open requests: the connection has ended."""
         with suppress(queue.Empty):
             while True:
-                _, _, answer = self._asked.get_nowait()
+                _, _, answer = self._requests.get_nowait()
                 answer.set_exception(ReplayGone("the replay has ended"))
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:

@@ -27,9 +27,9 @@ OffsetOption = Annotated[
 ]
 TABLE: Final = ".csv"
 """How the name of a table of poses ends; all else is a capture."""
-NAMES_TOLD: Final = 8
+NAMES_SHOWN: Final = 8
 Recomputing = Callable[[Path], Recompute]
-"""Makes what computes the frames between the captured ones of a capture."""
+"""Makes a function that computes the frames between the captured ones."""
 
 
 def read_offset(second: Path | None, offset: str | None) -> int:
@@ -83,5 +83,5 @@ def compared_text(path: Path, both: Collection[str]) -> str:
 
 def _some(names: Collection[str]) -> str:
     """Return names, the first of them where there are many."""
-    shown = [show(name)[1:-1] for name in sorted(names)[:NAMES_TOLD]]
-    return f"{', '.join(shown)} and {len(names) - NAMES_TOLD} more" if len(names) > NAMES_TOLD else ", ".join(shown)
+    shown = [show(name)[1:-1] for name in sorted(names)[:NAMES_SHOWN]]
+    return f"{', '.join(shown)} and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ", ".join(shown)

@@ -36,7 +36,7 @@ CHANNELS_SHOWN: Final = 8
 OTHERS: Final = "(others)"
 BANDS_MAX: Final = 500
 ENDPOINTS_MAX: Final = 60
-ASKED: Final = frozenset({MOVE, "push", "set", "add", "remove"})
+REQUESTED: Final = frozenset({MOVE, "push", "set", "add", "remove"})
 """Kinds of marks of requests."""
 
 Report = dict[str, Any]
@@ -280,7 +280,7 @@ class Collected:
         """Yield the events of the run: by the deployment, by a request, by the world's rules, and recoveries."""
         planned = {event_words(event) for event in self._deployment.network.events}
         for mark in self.timeline.news():
-            by = "asked for" if mark.kind in ASKED or mark.kind == NETWORK else "rules"
+            by = "requested" if mark.kind in REQUESTED or mark.kind == NETWORK else "rules"
             if mark.kind == NETWORK and mark.text in planned:
                 by = "deployment"
             elif mark.kind == RECOVERY:

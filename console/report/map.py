@@ -35,7 +35,7 @@ Place = tuple[float, float]
 
 
 class Loss(NamedTuple):
-    """A lost packet: the middle between its ends, or the end whose place is known."""
+    """A lost packet: the middle between its ends, or the end with a known place."""
 
     at: Place
     cause: str
@@ -95,7 +95,7 @@ class MapMaker:
             for name in deployment.endpoints()
             if self._world.body(name) in bodies or any(selects([glob], name) for glob in written)
         ]
-        """The endpoints whose place is known."""
+        """The endpoints with a known place."""
         least, most = PATH_POINTS
         self._points = max(least, min(most, ALL_POINTS // max(1, len(bodies))))
         self._frame: Frame | None = None
@@ -164,7 +164,7 @@ class MapMaker:
         }
 
     def drawn(self) -> dict[str, Any]:
-        """Return the scene as pages read it, without what a view from above leaves out, and the last poses.
+        """Return the scene as pages read it, without parts that are invisible from above, and the last poses.
 
         Both are empty where the capture has no frame.
         """

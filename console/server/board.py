@@ -22,7 +22,7 @@ MARKS_MAX: Final = 4096
 WATCHED_MAX: Final = 64
 """Links, and readings, that all browsers together have looked at."""
 KEPT: Final = frozenset({"status", "links", "compared", "overlay", "presence", "jobs"})
-"""Messages of which the last one is kept for browsers that join, and of which only the newest waits."""
+"""Types of messages of which the last one is kept for new browsers, and only the newest waits."""
 PLOTTED: Final = frozenset({"status", "links", "readings"})
 
 
@@ -131,7 +131,7 @@ class Board:
     def checked(self, source: int) -> int:
         """Return the number of a source, or raise `Malformed`."""
         if source >= len(self.sources):
-            raise Malformed(f"no source {source}: there are 0 to {len(self.sources) - 1}")
+            raise Malformed(f"no source {source}: valid are 0 to {len(self.sources) - 1}")
         return source
 
     def _welcome(self, reader: Reader, kind: str) -> bytes:
@@ -204,7 +204,7 @@ class Board:
         for reader in self.readers.values():
             reader.show(state.shown, now_s)
 
-    def tell(self, source: int, message: Mapping[str, Any]) -> None:
+    def publish(self, source: int, message: Mapping[str, Any]) -> None:
         state, kind = self._states[source], message["type"]
         whole = {"source": source, **message}
         if kind == "overlay":
@@ -259,5 +259,5 @@ class SourceFeed:
     def show(self, moment: Moment) -> None:
         self._board.show(self._source, moment)
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        self._board.tell(self._source, message)
+    def publish(self, message: Mapping[str, Any]) -> None:
+        self._board.publish(self._source, message)

@@ -34,8 +34,8 @@ class Hello(_Message, frozen=True, tag="hello"):
     token: Annotated[str, Meta(max_length=128)]
 
 
-class Ask(_Message, frozen=True, tag="ask"):
-    """Something is to be done; the answer has the same id."""
+class PageRequest(_Message, frozen=True, tag="request"):
+    """A verb for a source; the answer has the same id."""
 
     id: Number
     verb: Text
@@ -52,7 +52,7 @@ class Show(_Message, frozen=True, tag="show"):
 
 
 class Watch(_Message, frozen=True, tag="watch"):
-    """Of which link the last drops are to be explained; of none by null."""
+    """The link whose last drops are explained; null for none."""
 
     source: Place = 0
     link: tuple[Text, Text] | None = None
@@ -83,10 +83,10 @@ class Plot(_Message, frozen=True, tag="plot"):
     source: Place = 0
     series: Annotated[list[Series], Meta(max_length=CURVES_MAX)] = []
     generation: Number | None = None
-    """Of the scene whose fields are meant: of another one than the newest none are sent."""
+    """The generation of the fields' scene: fields of an older scene are ignored."""
 
 
-Message = Hello | Ask | Show | Watch | Plot
+Message = Hello | PageRequest | Show | Watch | Plot
 _decoder: Final[msgspec.json.Decoder[Message]] = msgspec.json.Decoder(Message)
 
 

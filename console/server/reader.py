@@ -1,6 +1,6 @@
 """One browser: what it follows, and a bounded outbox from which its connection takes as fast as it can.
 
-Of what is replaced by something newer (moments, status, figures of links) only the newest waits: a browser that reads
+Of messages that newer ones replace (moments, status, figures of links) only the newest waits: a browser that reads
 slowly, or not at all, costs no more than one message of each kind. Answers, marks and notes wait in their order; who
 has let too many of them wait is cut off. Pure: `server` moves the bytes.
 """

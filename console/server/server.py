@@ -26,16 +26,16 @@ from foosim.common.errors import Malformed, Refused
 from foosim.common.json_text import encode_json
 from foosim.console.server.board import Board
 from foosim.console.server.page_files import HEADERS, page_files
-from foosim.console.server.page_messages import MESSAGE_BYTES_MAX, Ask, Hello, read_message
+from foosim.console.server.page_messages import MESSAGE_BYTES_MAX, Hello, PageRequest, read_message
 from foosim.console.server.reader import Reader, Role, TooSlow
 from foosim.console.shown.curves import name_and_unit
-from foosim.console.shown.source import Answered, Curve, NotAsked, Source
+from foosim.console.shown.source import Answered, Curve, InvalidRequest, Source
 
 READERS_MAX: Final = 64
 """Browsers at once."""
 CONNECTIONS_MAX: Final = 256
 """Limit of all connections, authenticated or not."""
-ASKS_MAX: Final = 8
+REQUESTS_MAX: Final = 8
 """Limit of one browser's unanswered requests."""
 HELLO_S: Final = 5.0
 CLOSE_S: Final = 1.0
@@ -137,7 +137,7 @@ class ConsoleServer:
         try:
             await source.run(self.board.feed(number))
         except Refused as refused:
-            self.board.tell(number, {"type": "note", "level": "error", "text": str(refused)})
+            self.board.publish(number, {"type": "note", "level": "error", "text": str(refused)})
 
     async def _take_leave(self) -> None:
         """Send all browsers the reason of the end: that of the source, or of this console alone."""
@@ -244,35 +244,36 @@ class ConsoleServer:
 
     async def _read(self, connection: ServerConnection, reader: Reader) -> None:
         """Handle a page's messages, until its connection ends. Raises Malformed."""
-        slots = asyncio.Semaphore(ASKS_MAX)
+        slots = asyncio.Semaphore(REQUESTS_MAX)
         async for payload in connection:
             message = read_message(payload)
             if isinstance(message, Hello):
                 raise Malformed("a second hello")
-            if isinstance(message, Ask):
+            if isinstance(message, PageRequest):
                 self.board.checked(message.source)
                 await slots.acquire()
-                self._go(self._ask(reader, message, slots))
+                self._go(self._answer(reader, message, slots))
                 continue
             curves = self.board.follow(reader, message)
             if curves:
-                self._go(self._tell_history(reader, message.source, curves))
+                self._go(self._publish_history(reader, message.source, curves))
 
     def _go(self, work: Any) -> None:
-        """Do something beside; what becomes of it matters to one browser alone."""
+        """Run a task; its failure affects one browser only."""
         task: asyncio.Task[None] = self._loop.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _ask(self, reader: Reader, ask: Ask, slots: asyncio.Semaphore) -> None:
+    async def _answer(self, reader: Reader, request: PageRequest, slots: asyncio.Semaphore) -> None:
         """Forward a page's request to a source, and answer it."""
-        source = self._sources[ask.source]
+        source = self._sources[request.source]
         try:
             if reader.role != "operator":
-                raise NotAsked("this address only views; the other one that was printed lets you operate")
-            if ask.verb not in source.about.verbs:
-                raise NotAsked(f"nothing to ask {source.about.name} for: {ask.verb}; {', '.join(source.about.verbs)}")
-            answered = await source.ask(ask.verb, ask.arguments, reader.name)
+                raise InvalidRequest("this address only views; operate with the other printed address")
+            if request.verb not in source.about.verbs:
+                valid = ", ".join(source.about.verbs)
+                raise InvalidRequest(f"{source.about.name} has no request {request.verb}; valid: {valid}")
+            answered = await source.request(request.verb, request.arguments, reader.name)
         except Refused as refused:
             answered = Answered(str(refused), 0, accepted=False)
         finally:
@@ -281,16 +282,16 @@ class ConsoleServer:
             reader,
             {
                 "type": "answer",
-                "id": ask.id,
+                "id": request.id,
                 "accepted": answered.accepted,
                 "text": answered.text,
                 "tick": answered.tick,
-                "verb": ask.verb,
+                "verb": request.verb,
                 "who": reader.name,
             },
         )
 
-    async def _tell_history(self, reader: Reader, source: int, curves: tuple[Curve, ...]) -> None:
+    async def _publish_history(self, reader: Reader, source: int, curves: tuple[Curve, ...]) -> None:
         """Send a browser the recorded points of curves that it has begun to plot."""
         series = []
         for curve in curves:

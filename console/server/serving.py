@@ -1,7 +1,7 @@
 """Serves sources until a signal ends the process; the shell of `foosim view`.
 
-By default only this machine reaches the page. Another address takes a certificate, which browsers have to trust: a
-token that travels in the open is known to everybody on the way.
+By default only this machine reaches the page. Another address needs a certificate, which browsers have to trust:
+without encryption each host on the way reads the token.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Two sources on one clock, and how far apart what is in both is: run and what-if, simulation and reality.
+"""Two sources on one clock, and the distances of their common entities: run and what-if, simulation and reality.
 
 A distance is that of two positions of the same name at the same simulated time. Where one of the two is not known (an
 entity that was not there, a gap, a jump) there is no distance, and a series has a hole.
-Pure: neighbours are `tracks` (what is known between samples), `poses_csv`.
+Pure: neighbours are `tracks` (poses between samples), `poses_csv`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from foosim.console.shown.tracks import Pose
 
 POINTS: Final = 500
 """Points of a series over the whole time that both sources have."""
-ENTITIES_TOLD: Final = 200
+ENTITIES_SHOWN: Final = 200
 
 Positions = Mapping[str, Pose]
 Where = Callable[[int], Positions]
-"""Gives what is known of a source at a time in ns, by entity."""
+"""Gives the known poses of a source at a time in ns, by entity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Comparison:
         del self._wanted[:points]
 
     def as_json(self, tick: int) -> dict[str, Any]:
-        """Return what is known: the distance of each entity at a tick, and the series of the largest, m."""
+        """Return the distance of each entity at a tick, and the series of the largest, m."""
         time_ns = tick * self._tick_ns
         found = distances(self._one(time_ns), self._other(time_ns))
         return {**_content(tick, found, sorted(self._most.items())), "complete": self.is_complete}
@@ -86,11 +86,11 @@ class Course:
         self._is_interrupted = False
 
     def interrupt(self) -> None:
-        """Have a hole before the next point: what was in between is not known."""
+        """Leave a hole before the next point: distances in between are unknown."""
         self._is_interrupted = bool(self._points)
 
     def take(self, tick: int, found: Sequence[Distance]) -> dict[str, Any]:
-        """Take the distances at a tick and return what is known. Where time went back, what was later is forgotten."""
+        """Take the distances at a tick and return all of them. Where time went back, later ones are dropped."""
         while self._points and self._points[-1][0] >= tick:
             self._points.pop()
         if self._is_interrupted and self._points and self._points[-1][0] + 1 < tick:
@@ -118,6 +118,6 @@ def _content(tick: int, found: Sequence[Distance], series: Iterable[tuple[int, f
     """Return the content of a message: the distance of each entity at a tick, and the series of the largest, m."""
     return {
         "at": tick,
-        "entities": [{"name": one.name, "distance_m": round(one.metres, 6)} for one in found[:ENTITIES_TOLD]],
+        "entities": [{"name": one.name, "distance_m": round(one.metres, 6)} for one in found[:ENTITIES_SHOWN]],
         "series": [[at, None if metres is None else round(metres, 6)] for at, metres in series],
     }

@@ -1,4 +1,4 @@
-"""The points of plotted curves that are not numbers of the frame: figures of links, values of the status, readings."""
+"""The points of plotted curves from outside of the frame: figures of links, values of the status, readings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LINK_UNITS: Final[Mapping[str, str]] = {"delay_ms": "ms", "queue_ms": "ms", "los
 
 
 def name_and_unit(curve: Curve) -> tuple[str, str]:
-    """Return what a curve is called, and its unit where that is known without the scene."""
+    """Return the name of a curve, and its unit where that is known without the scene."""
     if curve.link is not None:
         return f"{curve.link[0]} > {curve.link[1]}: {curve.figure}", LINK_UNITS.get(curve.figure, "packets")
     if curve.reading is not None:
@@ -48,7 +48,7 @@ def _points(curve: Curve, message: Mapping[str, Any]) -> list[tuple[float, float
 
 
 def value_at(content: Any, path: str) -> float | None:
-    """Return the number at a path of keys joined by dots; None where there is none."""
+    """Return the number at a path of keys joined by dots; None for an unknown path."""
     for key in path.split("."):
         if isinstance(content, Mapping):
             content = content.get(key)

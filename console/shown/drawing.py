@@ -2,7 +2,7 @@
 
 The poses are those of `world.kinematics.forward_kinematics`. A link that hangs on the world by fixed joints alone, or
 by one free joint, needs no arithmetic: its pose is constant, or seven numbers of the frame, which are taken for all
-such links at once. The poses and numbers of absent entities are not a number.
+such links at once. The poses and numbers of absent entities are NaN.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class Poser:
     def __init__(self, layout: Layout, scene: Scene) -> None:
         count = sum(len(body.links) for body in scene.bodies.values())
         self._rest: NDArray[np.float32] = np.zeros((count, 7), np.float32)
-        """The poses of what never moves; the others' rows are overwritten."""
+        """The poses of fixed links; the rows of other links are overwritten."""
         self._jointed: list[tuple[int, Body, Entity]] = []
         leaving = [entity for entity in layout.entities if entity.can_leave]
         self._flags = np.array([entity.offsets[ABSENT] for entity in leaving], np.intp)
-        """The slots that say who is absent."""
+        """The slots that flag absent entities."""
         self._numbers = [slice(entity.start, entity.stop) for entity in leaving]
         places: dict[str, slice] = {}
         rows, slots = [], []
@@ -88,7 +88,7 @@ class Poser:
         return shown
 
     def _absent(self, values: NDArray[np.float64]) -> list[int]:
-        """Return who is absent, by the place among those who can be."""
+        """Return the places of absent entities in the list of entities that can be absent."""
         found: list[int] = np.flatnonzero(values[self._flags]).tolist()
         return found
 
@@ -122,7 +122,7 @@ class Drawing:
         self._overlays: Overlays | None = None
 
     def known(self, poses: Mapping[str, Pose]) -> NDArray[np.float32]:
-        """Return poses of links by name, in the order of the scene; not a number where there is none."""
+        """Return poses of links by name, in the order of the scene; NaN for links without one."""
         rows = np.full((len(self.links), 7), np.nan, np.float32)
         for link, (position, orientation) in poses.items():
             place = self.links.get(link)

@@ -1,4 +1,4 @@
-"""The links of a run as pages show them: what happened on each in the last seconds, where its ends are, what is
+"""The links of a run as pages show them: figures of the last seconds, places of the ends, what is
 between.
 
 The vHub counts from the start; a window is the difference of two counts, of which the older one is at most some
@@ -51,7 +51,7 @@ _NOTHING: Final = Count(0, 0, 0, 0, {})
 
 
 class Windows:
-    """Counts of the last seconds, and what they say of these seconds."""
+    """Counts of the last seconds, and the figures of these seconds."""
 
     def __init__(self, window_s: float = WINDOW_S) -> None:
         self._window_s = window_s
@@ -95,7 +95,7 @@ class Windows:
 
 
 def _between(before: Count, after: Count) -> Count:
-    """Return what was counted between two counts; all, where the link has begun to count anew."""
+    """Return the difference of two counts; all of the later one, where the link has begun to count anew."""
     if after.offered < before.offered:
         before = _NOTHING
     causes = Counter(after.causes)

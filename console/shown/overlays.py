@@ -53,7 +53,7 @@ class Overlays:
             return ()
 
     def _contacts(self, frame: Frame) -> list[tuple[float, ...]]:
-        """Return where free bodies touched something in the tick, and the impulse (N s): what is rigid meets those."""
+        """Return where free bodies touched something in the tick, and the impulse (N s)."""
         found = []
         for body in self._layout.free:
             count, impulse = frame.vector(body.name, "contacts", 2)

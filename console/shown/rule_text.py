@@ -1,5 +1,5 @@
-"""The rule of a link as people read it: its packets, its settings, its radio, its changes by events of the network at a
-time, and what that amounts to.
+"""The rule of a link in words: its packets, its settings, its radio, its changes by events of the network at a
+time, and the effective settings.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class RuleTexts:
         self._deployment = deployment
         self._endpoints = deployment.endpoints()
         self._profiles = deployment.profiles()
-        self._asked: tuple[tuple[int, str], ...] = ()
+        self._requested: tuple[tuple[int, str], ...] = ()
         self._timeline = self._timeline_of(())
         self._texts: dict[tuple[object, ...], str] = {}
 
@@ -37,20 +37,20 @@ class RuleTexts:
         source: str,
         destination: str,
         at_ns: int = 0,
-        asked: Iterable[tuple[int, str]] = (),
+        requested: Iterable[tuple[int, str]] = (),
         who: Mapping[int, str] | None = None,
     ) -> str:
-        """Return what holds at a time for the packets from one endpoint to another, in lines; the empty text where
-        there is no such endpoint.
+        """Return the rule for the packets from one endpoint to another at a time, in lines; an empty text for an
+        unknown endpoint.
 
-        `asked` are the requested events of the network by then, (tick, event as JSON); `who` names the requester of
-        those of a tick, where that is known.
+        `requested` are the events of the network by then, (tick, event as JSON); `who` names the requester of a tick,
+        where known.
         """
         if not {source, destination} <= {*self._endpoints}:
             return ""
-        events = tuple((tick, event) for tick, event in asked)
-        if events != self._asked:
-            self._asked, self._timeline = events, self._timeline_of(events)
+        events = tuple((tick, event) for tick, event in requested)
+        if events != self._requested:
+            self._requested, self._timeline = events, self._timeline_of(events)
         cut = [*self._cuts(source, destination, at_ns)]
         lines: list[str] = []
         for rule in self._profiles.rules_for(source, destination):
@@ -61,15 +61,15 @@ class RuleTexts:
         lines += [f"{what}{self._when(event, who or {})}" for what, event in cut]
         return "\n".join(lines)
 
-    def _timeline_of(self, asked: Iterable[tuple[int, str]]) -> Timeline:
+    def _timeline_of(self, requested: Iterable[tuple[int, str]]) -> Timeline:
         deployment = self._deployment
         network = deployment.network
         timeline = Timeline(network, deployment.seed if network.seed is None else network.seed, self._endpoints)
-        for tick, event in asked:
+        for tick, event in requested:
             try:
                 timeline.add(event_of(event, tick * deployment.tick_ns))
             except (ValidationError, ValueError, TypeError, Refused):
-                continue  # a capture's row that is damaged
+                continue  # a damaged row of a capture
         return timeline
 
     def _cuts(self, source: str, destination: str, at_ns: int) -> Iterator[tuple[str, Cut | Hold]]:
@@ -81,11 +81,11 @@ class RuleTexts:
                 yield "clogged: packets wait", hold
 
     def _when(self, event: Settings | Cut | Hold, who: Mapping[int, str]) -> str:
-        """Log since when something holds, by whom, until when."""
+        """Return since when something is in force, by which requester, until when."""
         tick_ns = self._deployment.tick_ns
         tick = event.start_ns // tick_ns
-        is_asked = any(asked == tick for asked, _ in self._asked)
-        by = f"asked for by {who[tick]}" if tick in who else "asked for" if is_asked else "by the deployment"
+        is_requested = any(requested == tick for requested, _ in self._requested)
+        by = f"requested by {who[tick]}" if tick in who else "requested" if is_requested else "by the deployment"
         until = "" if event.end_ns >= FOREVER_NS else f" until {event.end_ns / 1e9:g} s"
         return f", since {event.start_ns / 1e9:g} s (tick {tick}), {by}{until}"
 
@@ -109,7 +109,7 @@ def _lines(
     if rule is not None:
         yield f"rule {rule.id}, {rule_ends(rule)}: {impairments_text(rule) or 'no settings of its own'}"
     elif profile.rule == ON_BOARD:
-        yield "no rule: a link between a robot and what is on it is perfect"
+        yield "no rule: a link between a robot and its own parts is perfect"
     elif profile.rule == IDEAL:
         yield "no rule names the console: its links are perfect"
     else:

@@ -1,4 +1,4 @@
-"""A world as a page draws it, in JSON: links with their shapes, scenery, bodies, what can be plotted."""
+"""A world as a page draws it, in JSON: links with their shapes, scenery, bodies, fields for plots."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def _actuators(deployment: Deployment, robot: str) -> list[tuple[str, PayloadCod
 
 
 def _commands(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
-    """Return the numbers of a frame that are set-points: what an actuator holds of the last command that it took."""
+    """Return the numbers of a frame that are set-points: an actuator's part of its last accepted command."""
     return [
         {
             "robot": entity.name,

@@ -25,7 +25,7 @@ FIGURES: Final = ("offered", "delivered", "dropped", "loss", "delay_ms", "queue_
 """What can be plotted of a link."""
 
 
-class NotAsked(Refused):
+class InvalidRequest(Refused):
     """A source has no such verb, or not for this browser; the text lists the valid ones."""
 
 
@@ -41,7 +41,7 @@ class About:
     verbs: tuple[str, ...]
     """The verbs of an operator."""
     span: tuple[int, int] | None = None
-    """First and last tick of what has an end."""
+    """First and last tick of a source with an end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Moment:
     """Of each link of the scene, in its order, shape (links, 7): x, y, z in m, quaternion x, y, z, w; world frame. Not
     a number where it is absent, or where its pose is not known."""
     values: NDArray[np.float64]
-    """The frame's numbers, which the scene's `fields` index; not a number for what is absent, empty without a frame."""
+    """The frame's numbers, which the scene's `fields` index; NaN for absent entities, empty without a frame."""
     jump: bool = False
     """Not the moment after the one before: paths are cut here."""
     paused: bool = False
@@ -102,22 +102,22 @@ class Feed(Protocol):
     """Receives a source's messages. Called in the event loop's thread."""
 
     def describe(self, about: About, scene: Mapping[str, Any]) -> None:
-        """Log the scene, as `scene_json.scene_content` makes it, and what is new about the source."""
+        """Publish the scene (`scene_json.scene_content`) and the description of the source."""
 
     def show(self, moment: Moment) -> None:
         """Publish a moment; `poses` has as many rows as the scene has links."""
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        """Log a message of one of the types `status`, `links`, `overlay`, `watched`, `readings`, `marks`, `compared`,
-        `presence`, `note`; its number as a source is added to it."""
+    def publish(self, message: Mapping[str, Any]) -> None:
+        """Publish a message of one of the types `status`, `links`, `overlay`, `watched`, `readings`, `marks`,
+        `compared`, `presence`, `note`; the number of the source is added."""
 
 
 class Source(Protocol):
-    """What a page looks at."""
+    """A world that a page shows."""
 
     @property
     def about(self) -> About:
-        """What is known of it before it runs, and from then on."""
+        """Its description, valid before it runs and updated afterwards."""
 
     async def run(self, feed: Feed) -> None:
         """Publish the world to the feed until cancelled or complete."""
@@ -125,8 +125,8 @@ class Source(Protocol):
     def want(self, wanted: Wanted) -> None:
         """Take note of what the browsers look at. Called at each change, in the event loop's thread."""
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
-        """Have something done; `who` names the browser. Raises Refused with the reason."""
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+        """Execute a request; `who` names the browser. Raises Refused with the reason."""
 
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
-        """Return name, unit and points (tick, value) of a curve so far; no points where nothing is kept of it."""
+        """Return name, unit and points (tick, value) of a curve so far; no points without a history."""

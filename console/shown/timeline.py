@@ -1,7 +1,7 @@
 """Events of a run as marks on its time line: effects of the world's rules, requests, losses.
 
-The rules leave their memory in frames, so they tell from these what they did, to the tick, also where only every tenth
-frame is there. Pure, and bounded whatever the length of the run.
+The rules keep their memory in frames, so marks are exact to the tick also with every tenth frame only. Pure, and
+bounded for any length of the run.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Mark:
 
 
 class WorldEvents:
-    """Finds what the rules did between frames, taken in order. The first frame is what later ones are compared with."""
+    """Finds the effects of rules between frames, taken in order. Later frames are compared with the first one."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
@@ -57,7 +57,7 @@ class WorldEvents:
         self._before: Frame | None = None
 
     def take(self, frame: Frame) -> list[Mark]:
-        """Return what happened since the frame before; a frame that is not later begins anew."""
+        """Return the marks since the frame before; an earlier or equal frame begins anew."""
         before, self._before = self._before, frame
         if before is None or frame.tick <= before.tick:
             return []
@@ -124,7 +124,7 @@ class Timeline:
             return "an event of the network that cannot be read"
 
     def take_epoch(self, epoch: EpochRow) -> None:
-        """Take the next epoch: who came or is gone, and which robots were moved."""
+        """Take the next epoch: the nodes that joined or left, and the moved robots."""
         before, self._epoch = self._epoch, epoch
         if before is None:
             return
@@ -189,7 +189,7 @@ def edit_text(edit: EditRow) -> str:
 
 
 def _set_text(edit: EditRow) -> str:
-    """Return a description of a field that is set; empty for what comes with a place."""
+    """Return a description of a field that is set; empty for fields that follow from a place."""
     if edit.field == DOWN:
         return f"{edit.name} is {'in' if edit.numbers == [0.0] else 'out of'} service"
     if edit.field == "position":
@@ -204,7 +204,7 @@ def _vector(numbers: Sequence[float]) -> str:
 def moves(epochs: Sequence[EpochRow]) -> Iterator[tuple[int, str]]:
     """Yield (tick, text) of each robot that was moved from one node to another while both took part.
 
-    Recoveries report what another node adopts when its own is lost, and what goes back.
+    Recoveries report the robots that another node adopts at the loss of their own, and the ones that return.
     """
     for before, epoch in pairwise(epochs):
         owned = {owner.robot: owner.node for owner in before.owners}

@@ -21,7 +21,7 @@ GAP_NS: Final = 1_000_000_000
 """Samples that are further apart are not connected."""
 JUMP_M: Final = 0.1
 JUMP_M_S: Final = 20.0
-"""A step of more than the first at more than the second is a jump: what was placed there, and did not move there."""
+"""A step of more than the first at more than the second is a jump: the entity was placed there without a motion."""
 _NEARLY_PARALLEL: Final = 0.9995
 
 Pose = tuple[Vector, Quaternion]

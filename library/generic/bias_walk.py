@@ -21,7 +21,7 @@ STEP, START = 0, 1
 class BiasWalkSettings(ModifierSettings):
     """Adds an offset that walks: `initial` is its standard deviation at the start, `walk` that of a second's change.
 
-    Where nothing is said, it is 0.
+    The default is 0.
     """
 
     initial: PerField | None = None
@@ -35,7 +35,7 @@ class BiasWalkSettings(ModifierSettings):
     slots=lambda settings, about: {"offset": about.size},
 )
 class BiasWalk(Modifier):
-    """Adds an offset that walks to each number; what it has walked is in the frame."""
+    """Adds an offset that walks to each number; the offset is in the frame."""
 
     def __init__(self, settings: BiasWalkSettings, at: ModifierMounting) -> None:
         from foosim.common.batched.noise import NoiseAhead, NoiseKey  # brings numpy, which readers of settings need not

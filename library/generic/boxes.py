@@ -1,4 +1,4 @@
-"""A floor with boxes that stand still."""
+"""A floor with fixed boxes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What fire does to a robot that stays in it: it burns, and is out of service from then on.
 
-The rule is of the robot and not of the world: so each robot has its own time, and its drives stop as those of a robot
-with an empty battery do (`has_power`). A rule of the world could only write `down`, and the actuators would go on.
+The rule is of the robot, not of the world: each robot has its own time, and its drives stop as with an empty battery
+(`has_power`). A rule of the world could only write `down`, and the actuators would continue.
 """
 
 from __future__ import annotations

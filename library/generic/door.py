@@ -1,4 +1,4 @@
-"""A door: a box that slides from a closed place to an open one as far as it is told, and stops at who is in the way."""
+"""A door: a box that slides between a closed and an open place to the share `open`, and stops at obstacles."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class DoorObject(EntitySettings):
 
     @property
     def way(self) -> Vector:
-        """Which way it goes from closed to open (m)."""
+        """The way from closed to open (m)."""
         if self.lifts:
             return 0.0, 0.0, self.travel
         return self.travel * cos(self.closed.yaw), self.travel * sin(self.closed.yaw), 0.0
@@ -119,14 +119,14 @@ def _leaf(its: DoorObject, place: Sequence[float]) -> Leaf:
     settable={"open": OPEN},
 )
 class Door(Model):
-    """A door that slides open and shut, as far as it is told.
+    """A door that slides between shut and open, to the share `open`.
 
     `open` is the share of its way by which it is to be open, `opened` by which it is, `blocked` that something is in
     its way.
     """
 
     is_upright = False
-    """To others it is what its shape is, and no cylinder."""
+    """Others meet its shape, not a cylinder."""
 
     def __init__(self, settings: DoorObject, at: Mounting) -> None:
         self._settings, self._at = settings, at

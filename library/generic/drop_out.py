@@ -25,7 +25,7 @@ class DropOut(Modifier):
     """Drops some values."""
 
     def __init__(self, settings: DropOutSettings, at: ModifierMounting) -> None:
-        from foosim.common.batched.noise import NoiseKey  # brings numpy, which those who only read settings need not
+        from foosim.common.batched.noise import NoiseKey  # brings numpy, which readers of settings do not need
 
         self._probability = settings.probability
         self._stream = NoiseKey(at.key)

@@ -19,7 +19,7 @@ Side = Annotated[float, Quantity(units.LENGTH, "1 m", "10 km")]
 
 
 class EmptySettings(SceneSettings):
-    """A floor at z = 0 around the origin: `length` along x and `width` along y, 100 m each unless said otherwise.
+    """A floor at z = 0 around the origin: `length` along x and `width` along y, 100 m each by default.
 
     `surface` is what rigid bodies feel of it, '' nothing.
     """

@@ -53,7 +53,7 @@ class FireObject(EntitySettings):
 @lru_cache(maxsize=64)
 def _cone(radius: float) -> Mesh:
     """Return a cone that is as high as its radius (m)."""
-    import numpy as np  # for those who make bodies
+    import numpy as np  # only where bodies are built
 
     from foosim.world.bodies.hull import convex_hull
 
@@ -98,7 +98,7 @@ class Growing(Motion):
 class Fire(Model):
     """A fire; `radius` can be set, at most to the greatest one: 0 puts it out.
 
-    It is drawn as a cone of the greatest radius that is sunk into the ground: what is above has the fire's own radius.
+    It is drawn as a cone of the greatest radius that is sunk into the ground: the part above has the fire's own radius.
     """
 
     def __init__(self, settings: FireObject, at: Mounting) -> None:
@@ -115,7 +115,7 @@ class Fire(Model):
         return Body(name, "fire", ORIGIN, (place, flame), is_solid=False)
 
     def place(self, view: WritableView) -> None:
-        """Light it where its settings say."""
+        """Light it at the place of its settings."""
         its = self._settings
         view.write(self._at.slot("position"), *its.at.position)
         view.write(self._at.slot("orientation"), *UPRIGHT)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class GaussianNoiseSettings(ModifierSettings):
     """Adds a normal draw to each number: `std` is the standard deviation, of each field or of all.
 
-    What is at an end of its sensor's range stays: it says that nothing was measured. The result is within that range.
+    Values at an end of the sensor's range stay: they mean no measurement. The result is within that range.
     """
 
     std: PerField
@@ -32,7 +32,7 @@ class GaussianNoise(Modifier):
     """Adds a normal draw to each number."""
 
     def __init__(self, settings: GaussianNoiseSettings, at: ModifierMounting) -> None:
-        from foosim.common.batched.noise import (  # brings numpy, which those who only read settings need not
+        from foosim.common.batched.noise import (  # brings numpy, which readers of settings do not need
             NoiseAhead,
             NoiseKey,
         )

@@ -1,4 +1,4 @@
-"""Where a place on a robot is on Earth, as a receiver of satellite navigation says it."""
+"""The place of a mount on Earth, as by a receiver of satellite navigation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DEGREES: Final = 180.0 / pi
 class GpsSettings(SensorSettings):
     """Where a place on a robot is on Earth: `at` is that of the antenna, in the frame of a link.
 
-    The deployment says by `origin` where its world lies.
+    The deployment's `origin` is the place of its world on Earth.
     """
 
     at: MountedAt = FIRST_LINK

@@ -1,4 +1,4 @@
-"""An inertial measurement unit: what an accelerometer and a gyroscope measure at a place on a robot.
+"""An inertial measurement unit: accelerometer and gyroscope at a place on a robot.
 
 An accelerometer measures the specific force f = a - g, its acceleration less that of free fall, in its own axes; one at
 rest shows the gravity upwards (Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems,
@@ -63,8 +63,7 @@ class Imu(Sensor):
 
     @staticmethod
     def check(settings: ImuSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a link that the robot does not have, or a robot whose places move nobody
-        knows how."""
+        """Raise IncompatibleComponent for an unknown link, or a robot whose motion at that place is unknown."""
         Mounted(at, settings.at).check_twist()
 
     def sample(self, view: WritableView) -> Inertial:

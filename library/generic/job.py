@@ -1,4 +1,4 @@
-"""How the jobs of an actuator stand."""
+"""The states of the jobs of an actuator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foosim.world.forms.registry import sensor
 
 @sensor("job", JobSettings, Jobs, trigger=lambda settings: f"{settings.actuator}.{CHANGED}")
 class JobSensor(Sensor):
-    """Whose job an actuator does, and the last job of each sender, with how it stands."""
+    """The sender of an actuator's running job, and the last job of each sender with its state."""
 
     def __init__(self, settings: JobSettings, at: Mounting) -> None:
         self._running, self._numbers, self._states = (

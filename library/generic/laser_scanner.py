@@ -1,4 +1,4 @@
-"""A laser scanner: the distances to what stands in the way of beams that sweep a plane."""
+"""A laser scanner: the distances to the first thing on each beam in a plane."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "1 km")]
 
 
 class LaserScannerSettings(SensorSettings):
-    """How far it is from `at` to what stands in the way of each of `rays` beams, from `least` to `range`.
+    """The distance from `at` to the first thing on each of `rays` beams, from `least` to `range`.
 
     They are in the plane of x and y of the mount, over `angle` in equal steps: the first is farthest to the right of x,
     the last farthest to the left. Of a full turn the first is behind, and none is there twice; a single one is ahead.
@@ -63,7 +63,7 @@ class Scan(Struct, frozen=True):
 
 @sensor("laser_scanner", LaserScannerSettings, Scan, array_length="rays", shown_as="foxglove.LaserScan")
 class LaserScanner(Sensor):
-    """The distance to what each beam meets, the robot's own body aside; the range where that is nothing."""
+    """The distance to the first thing on each beam other than the robot's own body; the range for none."""
 
     def __init__(self, settings: LaserScannerSettings, at: Mounting) -> None:
         self.least_m, self.range_m = settings.least, settings.range
@@ -83,7 +83,7 @@ class LaserScanner(Sensor):
 
     @staticmethod
     def rays(sensors: Sequence[LaserScanner], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each beam: from the mount to what it meets, or as far as the sensor reaches."""
+        """Return both ends of each beam: from the mount to the first thing, or as far as the sensor reaches."""
         far = np.array([[one.range_m] for one in sensors])
         return BeamsTogether([one.beams for one in sensors]).ends(numbers, np.zeros_like(far), far)
 

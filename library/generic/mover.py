@@ -1,4 +1,4 @@
-"""A thing that goes along a path again and again, or once: a door, a conveyor's load, somebody who walks."""
+"""A thing that moves along a path, repeatedly or once: a door, a conveyor's load, a walking person."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ def _sensible(path: list[PathPoint]) -> list[PathPoint]:
     timed = [point.time_ns is not None for point in path]
     if any(timed) and not all(timed):
         number = timed.index(not timed[0]) + 1
-        raise custom_error(BadValue(f"all points of a path have a time or none has: point {number} differs"))
+        raise custom_error(BadValue(f"point {number} differs: give all points of a path a time, or none"))
     for number, (one, other) in enumerate(pairwise(path), 2):
         if one.time_ns is None or other.time_ns is None:
             if one.point.way_to(other.point) == 0.0:
-                raise custom_error(BadValue(f"point {number} is where the one before it is: without times it cannot"))
+                raise custom_error(BadValue(f"point {number} equals the one before it: the path needs times"))
         elif other.time_ns <= one.time_ns:
-            raise custom_error(BadValue(f"the time of point {number} is not after that of the one before it"))
+            raise custom_error(BadValue(f"the time of point {number} is not after the time of the point before it"))
         elif one.point.way_to(other.point) > FASTEST * (other.time_ns - one.time_ns) / 1e9:
             raise custom_error(BadValue(f"the way to point {number} is faster than {FASTEST:g} m/s"))
     return path
@@ -78,11 +78,11 @@ PathPoints = Annotated[list[PathPoint], Field(min_length=2, max_length=POINTS_MA
 
 
 class MoverRobot(RobotSettings):
-    """A box, a cylinder or a sphere that goes along a path with the middle of its underside.
+    """A box, a cylinder or a sphere that moves along a path with the middle of its underside.
 
     A box has `length`, `width` and `height`, a cylinder `radius` and `height`, a sphere `radius`. The points of `path`
     have each a `time`, or the way between them is gone at `speed`. With `loop` it begins again: with times the last
-    point is where the first is, with a speed it goes there. It waits where it is stopped, and goes on from there.
+    point is where the first is, with a speed it goes there. It waits where it is stopped, and continues from there.
     """
 
     shape: Literal["box", "cylinder", "sphere"] = "box"
@@ -109,15 +109,15 @@ class MoverRobot(RobotSettings):
                 yield f"a {self.shape} has {' and '.join(sizes)}: {key} {problem}"
         first, last = self.path[0], self.path[-1]
         if first.time_ns is None and self.speed is None:
-            yield "a path whose points have no times is gone at a speed, which is missing"
+            yield "a path without times needs a speed"
         if first.time_ns is not None and self.speed is not None:
-            yield "a path whose points have times has no speed besides"
+            yield "a path with times has no speed"
         if self.loop:
             is_closed = first.point.way_to(last.point) == 0.0
             if first.time_ns is not None and not is_closed:
-                yield "a loop whose points have times ends where it begins"
+                yield "a loop with times must end where it begins"
             if first.time_ns is None and is_closed:
-                yield "a loop at a speed goes back by itself: its last point is not the first one"
+                yield "a loop at a speed returns by itself: leave out the last point, which equals the first"
 
     def as_path(self) -> Path:
         """Return the path in time."""
@@ -148,7 +148,7 @@ class _Batch:
         self.movers = way.movers(entities)
         robots = [at.spec.robots[entity.name] for entity in entities]
         self.paths = [its.as_path() for its in robots if isinstance(its, MoverRobot)]
-        assert len(self.paths) == len(robots), "the motion track moves what has a path"
+        assert len(self.paths) == len(robots), "the motion track moves entities with a path"
 
 
 class Track(Motion):
@@ -202,7 +202,7 @@ class Track(Motion):
     units={"heading": ("rad",)},
 )
 class Mover(Model):
-    """A box, a cylinder or a sphere that goes along a path; `blocked` is whether an obstacle stopped it in the tick."""
+    """A box, a cylinder or a sphere that moves along a path; `blocked`: an obstacle stopped it in the tick."""
 
     def __init__(self, settings: MoverRobot, at: Mounting) -> None:
         self._settings, self._at = settings, at
@@ -224,7 +224,7 @@ class Mover(Model):
         return Body(name, "mover", ORIGIN, (link,), (0.0, 0.0, height), self._path.fastest)
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles: the cylinder in which it can have any heading."""
+        """Return its cylinder for obstacles, in which it can have any heading."""
         length, width, height = self._settings.size()
         radius = length / 2 if self._settings.shape != "box" else sqrt(length * length + width * width) / 2
         return Upright(radius, 0.0, height)

@@ -26,7 +26,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """Points in the order of their times, at least two; all over again behind the last one where it is a loop."""
+    """Points in the order of their times, at least two; again from the first after the last one in a loop."""
 
     points: tuple[Point, ...]
     times: tuple[float, ...]
@@ -39,7 +39,7 @@ class Path:
         return max(one.way_to(other) / (other.time - one.time) for one, other in pairs)
 
     def after(self, clock: float, time: float) -> float:
-        """Return the clock of a path (s) when some time has passed; behind the end of a path it stands still."""
+        """Return the clock of a path (s) after some time; it stops at the end of the path."""
         clock, last = clock + time, self.times[-1]
         if clock < last:
             return clock

@@ -1,4 +1,4 @@
-"""What is near a robot: rays around it against all that stands in their way, measured from its own hull.
+"""Distances around a robot along rays, measured from its own hull.
 
 The hull is the first shape of the robot's first link. Rays begin at its middle, in the plane of x and y of the link,
 and pass the robot's own body. A distance counts from where a ray leaves the last shape of that link.
@@ -31,7 +31,7 @@ RAYS_MAX: Final = 128
 
 
 class ProximitySettings(SensorSettings):
-    """How far it is from a robot's hull to what stands in the way of each of `rays` rays, at most `range`.
+    """The distance from a robot's hull to the first thing on each of `rays` rays, at most `range`.
 
     The first ray is ahead, the others evenly around to the left, at half of the hull's height.
     """
@@ -74,7 +74,7 @@ class Proximity(Sensor):
 
     @staticmethod
     def rays(sensors: Sequence[Proximity], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each ray: from a robot's hull to what it meets, or as far as the sensor reaches.
+        """Return both ends of each ray: from a robot's hull to the first thing, or as far as the sensor reaches.
 
         All have as many rays.
         """

@@ -1,4 +1,4 @@
-"""A range finder, as of ultrasound or infrared: the distance to the nearest of what is in a cone."""
+"""A range finder, as of ultrasound or infrared: the distance to the nearest thing in a cone."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "1 km")]
 
 
 class RangeSettings(SensorSettings):
-    """How far it is from `at`, along the x axis of the mount, to what is there, from `least` to `range`.
+    """The distance from `at`, along the x axis of the mount, to the nearest thing, from `least` to `range`.
 
     With a `cone`, whose angle is that from side to side, it is the nearest that 13 beams meet: one along the axis, four
     half-way to the cone's surface and eight on it. Without one it is a single beam.
@@ -71,7 +71,7 @@ class RangeFinder(Sensor):
 
     @staticmethod
     def rays(sensors: Sequence[RangeFinder], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each beam: from the mount to what it meets, or as far as the sensor reaches."""
+        """Return both ends of each beam: from the mount to the first thing, or as far as the sensor reaches."""
         found = []
         for one in sensors:  # some have a cone, others a beam
             far = np.array([[one.range_m]])

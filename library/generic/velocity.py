@@ -26,7 +26,7 @@ class VelocitySettings(SensorSettings):
 
 
 class Velocity(Struct, frozen=True):
-    """The velocity of a place, and how fast what it is fixed to turns about each axis."""
+    """The velocity of a place, and the turn rate of its link about each axis."""
 
     x: MetresPerSecond
     y: MetresPerSecond
@@ -40,7 +40,7 @@ class Velocity(Struct, frozen=True):
 
 @sensor("velocity", VelocitySettings, Velocity, needs=("position", "orientation", "linear_velocity"))
 class VelocitySensor(Sensor):
-    """Velocity and turn rate of the mount: as it moves over the ground, with what the wheels slip."""
+    """Velocity and turn rate of the mount over the ground, with the slip of the wheels."""
 
     def __init__(self, settings: VelocitySettings, at: Mounting) -> None:
         """Raises BadValue for a link that the robot does not have."""

@@ -1,4 +1,4 @@
-"""How bodies on a plane go on in a short time, many at once: speeds that approach others, and ways along arcs.
+"""Motion of bodies on a plane in a short time, many at once: speeds that approach targets, and ways along arcs.
 
 All is element by element, of + - * / and square roots with the functions of `exact_arrays`: the bits of one do not
 depend on who else is in the batch.
@@ -48,7 +48,7 @@ class Arcs(NamedTuple):
 
 
 def along_arcs(ahead: Floats, left: Floats | float, turned: Floats, heading: Floats) -> Arcs:
-    """Return how bodies go on whose velocity in their own frame stays as it is.
+    """Return the motion of bodies with a constant velocity in their own frame.
 
     Each rolls `ahead` and `left` (m) while it turns by `turned` (rad) from `heading` on. It moves by the chord of its
     arc, the way times sin(turned / 2) / (turned / 2), in the direction half-way between (Siegwart, Nourbakhsh,

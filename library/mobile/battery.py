@@ -1,10 +1,10 @@
 """What a battery of a robot is like: its settings, and the numbers of the battery that a robot has.
 
-The battery of a robot: what standing and going take from it, and what chargers give. Empty, it stops the drives.
+The battery of a robot: the costs of idling and moving, and the power of chargers. Empty, it stops the drives.
 
 In a tick of dt the charge falls by idle power x dt + drag x way, and rises by power x dt for each charger within whose
 radius the robot is, between 0 and the capacity. The way of a rover is that of its wheels, of any other robot the
-distance between its places at the tick's start and end; a robot with a fixed base goes no way.
+distance between its places at the tick's start and end; a robot with a fixed base covers none.
 
 A robot's battery: its charge and its voltage.
 """
@@ -46,7 +46,7 @@ Reach = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 km")]
 
 
 class Charger(SpecBase):
-    """A place that charges with `power` whoever is within `radius` of it, seen from above.
+    """A place that charges each robot within `radius` of it, seen from above, with `power`.
 
     It is round about `x`, `y`; with a `tag`, round about each entity that has the tag, wherever that is.
     """
@@ -60,7 +60,7 @@ class Charger(SpecBase):
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
         if (self.tag is None) is (self.x is None and self.y is None):
-            raise custom_error(BadValue("a charger is about x and y, or about a tag"))
+            raise custom_error(BadValue("a charger has x and y, or a tag"))
         return self
 
 
@@ -107,7 +107,7 @@ def cell_of(settings: BatteryRuleSettings | None, at: Mounting) -> Cell:
 
 
 def chargers_of(settings: BatteryRuleSettings, at: Mounting) -> list[Charger]:
-    """Return what charges a robot: of a rover the stations of its hall, in the order of their names."""
+    """Return the chargers of a robot: for a rover the stations of its hall, in the order of their names."""
     if not is_rover(at.spec, at.robot):
         return settings.chargers
     station = hall_of(at.spec).station
@@ -135,10 +135,10 @@ def check_battery(settings: BatteryRuleSettings, at: Mounting) -> None:
         valid = "its battery is that of hall.rover.battery, hall.station charges it"
         raise IncompatibleComponent((given[0],), f"not of a rover of the hall: {valid}", given[0])
     if not is_rover(at.spec, at.robot) and settings.capacity is None:
-        raise IncompatibleComponent(("kind",), "a battery without a capacity, such as capacity: 200 Wh", settings.kind)
+        raise IncompatibleComponent(("kind",), "a battery needs a capacity, for example 200 Wh", settings.kind)
     first, *more = batteries_of(at.spec, at.robot)
     if more and at.name != first:
-        raise IncompatibleComponent(("kind",), f"a second battery of a robot: it has {first}", settings.kind)
+        raise IncompatibleComponent(("kind",), f"a second battery: the first is {first}", settings.kind)
 
 
 EMPTY: Final = "empty"
@@ -177,7 +177,7 @@ class BatteryRule(EntityRule):
         check_battery(settings, at)
 
     def place(self, view: WritableView) -> None:
-        """Charge it as the deployment says; a rover says it itself."""
+        """Charge it by the deployment's or the rover's own setting."""
         if not self._is_rover:
             view.write(self._charge, self._start)
 
@@ -190,7 +190,7 @@ class BatteryRule(EntityRule):
         return view.numbers[self._charge.at] > 0.0
 
     def apply(self, view: WritableView) -> None:
-        """Take what a tick costs, and give what chargers give."""
+        """Subtract the cost of a tick, and add the energy from chargers."""
         charge = view.numbers[self._charge.at] - self._idle * self._dt - self._drag * self._way(view)
         chargers = [*self._standing, *self._places(view)] if self._tagged else self._standing
         if chargers:
@@ -221,7 +221,7 @@ class BatteryRule(EntityRule):
         return place[0], place[1]
 
     def _places(self, view: View) -> Iterator[tuple[float, float, float, float]]:
-        """Yield where those are who charge, at the tick's start."""
+        """Yield the places of chargers at the tick's start."""
         for entity, reach, power in self._tagged:
             place = self._around.position(view, entity)
             if place is not None:

@@ -96,19 +96,19 @@ class DifferentialDriveRobot(Vehicle):
         for key in others:
             if key in self.model_fields_set:
                 other = "kinematic" if self.dynamics == "rigid" else "rigid"
-                yield f"{key} is a setting with dynamics: {other} alone"
+                yield f"{key} needs dynamics: {other}"
         if self.dynamics != "rigid":
             return
         if self.mass <= 2.0 * self.wheel_mass:
-            yield "nothing is left for the hull: mass is that of all, with both wheels, each of wheel_mass"
+            yield "no mass is left for the hull: mass includes both wheels, each of wheel_mass"
         if self.clearance >= min(self.height, self.radius / 2.0, 2.0 * self.wheel_radius):
-            yield "clearance is less than height, than half of radius, and than twice wheel_radius"
+            yield "clearance must be below height, half of radius and twice wheel_radius"
         if self.wheel_radius > self.radius:
             yield "the wheels would be outside of the robot: wheel_radius is more than radius"
         if self.bumper is not None and self.bumper > 4.0 * self.radius:
             yield "a bumper is at most twice as wide as the robot"
         if self.speed_limit < 2.0 * self.speed:
-            yield "speed_limit is at least twice speed: so fast is the top of a wheel"
+            yield "speed_limit must be at least twice speed, the speed of the top of a wheel"
 
     @property
     def felt_surfaces(self) -> Mapping[str, str]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from foosim.common.exact_math import atan2
 from foosim.library.mobile.arcs import Arcs, Floats, along_arcs, approached
-from foosim.library.mobile.asked import asked_of
 from foosim.library.mobile.differential import DifferentialDriveRobot, rigid_body
+from foosim.library.mobile.set_points import set_points_of
 from foosim.library.mobile.vehicles import body_of, is_in_reach, set_down, upright
 from foosim.library.mobile.wheels import WheelMotors, Wheels, slips_of, wheels_of
 from foosim.library.rigid.primitives import RIGID
@@ -90,8 +90,8 @@ class WheeledMotion(Motion):
         state = batch.state.read_at_start(view)
         place, heading = state[:, 0:3].copy(), state[:, 13].copy()
         speeds, travel = state[:, 14:16].copy(), state[:, 16:18].copy()
-        asked = asked_of(motors, STANDING)
-        targets, rates = asked[:, :, 0], asked[:, :, 1]
+        set_points = set_points_of(motors, STANDING)
+        targets, rates = set_points[:, :, 0], set_points[:, :, 1]
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
@@ -146,7 +146,7 @@ class RigidDifferentialDrive(Model):
         return rigid_body(self._settings, self._at.robot.name, GREEN)
 
     def wheels(self) -> Wheels:
-        """Return its wheels and their motors; how far they slip follows from what they feel."""
+        """Return its wheels and their motors; their slip follows from friction."""
         its = self._settings
         motors = WheelMotors(its.wheel_radius, its.torque, self._rates, self._tick_s)
         return Wheels(its.track, its.speed, its.acceleration, its.turn_rate, motors=motors)
@@ -205,7 +205,7 @@ class DifferentialDrive(Model):
         return body_of(settings, self._at.robot.name, "differential_drive", BLUE, settings.speed)
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles."""
+        """Return its cylinder for obstacles."""
         return upright(self._settings)
 
     def wheels(self) -> Wheels:

@@ -52,10 +52,10 @@ class Place(Struct, frozen=True):
     jobs=True,
 )
 class GoTo(Actuator):
-    """Keeps the last place that it was told; without any the robot stands."""
+    """Keeps the place of the last command; without one the robot stands."""
 
     def __init__(self, settings: GoToSettings, at: Mounting) -> None:
-        """Raises BadValue where the robot's model does not say how it moves."""
+        """Raises BadValue for a model without wheels and without a way to move."""
         self._given, self._target = at.slot("given"), at.slot("target")
         self._position, self._heading = at.slot("position"), at.slot("heading")
         self._tolerance, self._progress = settings.tolerance, Progress(at, settings.patience_ns)
@@ -65,11 +65,11 @@ class GoTo(Actuator):
 
     @staticmethod
     def check(settings: GoToSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a robot that neither has wheels nor goes in any direction."""
+        """Raise IncompatibleComponent for a robot that neither has wheels nor moves in any direction."""
         is_base = isinstance(at.spec.robots[at.robot.name], HolonomicRobot)
         if not is_base and made_model(at.spec, at.layout, at.robot).wheels() is None:
             raise IncompatibleComponent(
-                ("kind",), "it moves robots on two wheels, and those of the model holonomic", settings.kind
+                ("kind",), "valid are robots on two wheels and of the model holonomic", settings.kind
             )
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -91,7 +91,7 @@ class GoTo(Actuator):
         self._set(view, 0.0, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Go to a place ahead and aside, for the small run that tells engines apart."""
+        """Go to a place ahead and aside, for the run that compares engines."""
         x, y, _ = view.read(self._position)
         self._set(view, 1.0, x + 1.0, y + 0.5)
 
@@ -106,24 +106,24 @@ class GoTo(Actuator):
         return x - here_x, y - here_y
 
     def command(self, view: View) -> Motors:
-        """Return what the drive is asked for."""
+        """Return the set-points of the drive's motors."""
         x, y = self._way(view)
         left_m, heading = hypot(x, y), view.numbers[self._heading.at]
         if view.numbers[self._given.at] == 0.0 or left_m <= self._tolerance:
-            return self._drive.asked(Steering(0.0, 0.0, 0.0), view)
+            return self._drive.set_points(Steering(0.0, 0.0, 0.0), view)
         felt = NOTHING_FELT if self._feelers is None else self._feelers.felt(view, heading, left_m)
         bearing, its = shorter(atan2(y, x) - heading), self._drive
-        return its.asked(steered(left_m, bearing, felt, its.most, its.acceleration, its.turning), view)
+        return its.set_points(steered(left_m, bearing, felt, its.most, its.acceleration, its.turning), view)
 
 
 class _Base:
-    """The drive of a base that goes in any direction, and turns to where it goes."""
+    """The drive of a base that moves in any direction, and turns to its course."""
 
     def __init__(self, robot: HolonomicRobot) -> None:
         self.most = Steering(robot.speed, 0.0, robot.turn_rate)
         self.acceleration, self.turning = robot.acceleration, robot.acceleration / robot.radius
 
-    def asked(self, steering: Steering, view: View) -> Motors:
+    def set_points(self, steering: Steering, view: View) -> Motors:
         ahead, left = steering.speed * cos(steering.direction), steering.speed * sin(steering.direction)
         return (ahead, self.acceleration), (left, self.acceleration), (steering.turning, self.turning)
 
@@ -136,10 +136,10 @@ class _OnWheels:
         self.most = Steering(its.speed, 0.0, its.turn_rate)
         self.acceleration, self.turning = its.acceleration, 2.0 * its.acceleration / its.track
 
-    def asked(self, steering: Steering, view: View) -> Motors:
+    def set_points(self, steering: Steering, view: View) -> Motors:
         is_ahead = abs(steering.direction) < AHEAD_RAD
         speed = steering.speed * cos(steering.direction) if is_ahead else 0.0
         aside = steering.turning * self._wheels.track / 2.0
         left, right = speed - aside, speed + aside
         share = self.most.speed / max(abs(left), abs(right), self.most.speed)
-        return self._wheels.asked(left * share, right * share, view)
+        return self._wheels.set_points(left * share, right * share, view)

@@ -1,4 +1,4 @@
-"""The hall: `hall:` of a deployment makes a hall with walls, and says what its rovers and stations are like."""
+"""The hall: `hall:` of a deployment has the walls of a hall and the properties of its rovers and stations."""
 
 from __future__ import annotations
 

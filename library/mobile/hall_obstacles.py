@@ -81,7 +81,7 @@ class _Rovers:
         self._count = 0
 
     def near(self, x: float, y: float) -> Iterator[tuple[str, Outline]]:
-        """Yield those that a rover at a place may be in, in the order in which they were added."""
+        """Yield the obstacles that a rover at a place may overlap, in the order of their addition."""
         east, north = self._square(x, y)
         around = ((east + i, north + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
         found = sorted((entry for square in around for entry in self._squares.get(square, ())), key=itemgetter(0))

@@ -75,7 +75,7 @@ class Station(SpecBase):
 
 
 class Hall(SpecBase):
-    """The whole hall: its bounds, which are walls, and what its rovers and base stations are like."""
+    """The whole hall: its bounds, which are walls, and the properties of its rovers and base stations."""
 
     length: Side
     width: Side
@@ -90,7 +90,7 @@ def hall_of(spec: WorldSpec) -> Hall:
 
 
 def hall_findings(hall: Hall) -> Iterator[Finding]:
-    """Yield what is wrong between the settings of a hall."""
+    """Yield the contradictions between the settings of a hall."""
     rover = hall.rover
     if 2 * rover.radius > min(hall.length, hall.width):
         yield Finding((HALL, "rover", "radius"), "more than half of the hall's least side")

@@ -1,4 +1,4 @@
-"""A round base that goes in any direction, as on omnidirectional wheels, moved by kinematics."""
+"""A round base that moves in any direction, as on omnidirectional wheels, moved by kinematics."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from foosim.common.spec_base import default
 from foosim.library.mobile.arcs import along_arcs, approached, approached_together
-from foosim.library.mobile.asked import asked_of
+from foosim.library.mobile.set_points import set_points_of
 from foosim.library.mobile.vehicles import (
     Acceleration,
     Speed,
@@ -35,7 +35,7 @@ TEAL: Final[Colour] = (0.10, 0.55, 0.55, 1.0)
 
 
 class HolonomicRobot(Vehicle):
-    """A round base that goes in any direction. Its usual actuator is `motion`, of the kind `x_y_w`.
+    """A round base that moves in any direction. Its usual actuator is `motion`, of the kind `x_y_w`.
 
     `speed` and `acceleration` are the greatest in any direction, and `turn_rate` is how fast it turns at most; how fast
     it turns changes by at most `acceleration` over `radius`, so that the rim has no more. The sizes are those of usual
@@ -72,8 +72,8 @@ class _Batch:
 class HolonomicMotion(Motion):
     """In any direction, along arcs, as far as nothing is in the way.
 
-    The velocity in the base's own frame approaches what is asked of it: the vector in the plane with at most one
-    acceleration, the turning with another. With it the base goes along an arc (`moving.arcs`), as far as nothing is in
+    The velocity in the base's own frame approaches its set-point: the vector in the plane with at most one
+    acceleration, the turning with another. With it the base moves along an arc (`moving.arcs`), as far as nothing is in
     the way (`moving.free_way`); it turns where it is blocked.
     """
 
@@ -95,8 +95,8 @@ class HolonomicMotion(Motion):
         batch, dt, count = self._batch, self._dt, len(entities)
         state = batch.state.read_at_start(view)
         place, heading, velocity = state[:, 0:3].copy(), state[:, 13].copy(), state[:, 14:17].copy()
-        asked = asked_of(motors, STANDING)
-        targets, rates = asked[:, :, 0], asked[:, :, 1]
+        set_points = set_points_of(motors, STANDING)
+        targets, rates = set_points[:, :, 0], set_points[:, :, 1]
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
@@ -128,7 +128,7 @@ class HolonomicMotion(Motion):
     units={"heading": ("rad",), "base_velocity": ("m/s", "m/s", "rad/s")},
 )
 class Holonomic(Model):
-    """A round base that goes in any direction.
+    """A round base that moves in any direction.
 
     `base_velocity` is what its wheels do, ahead, to the left and turning left; `blocked` whether an obstacle stopped it
     in the tick.
@@ -144,7 +144,7 @@ class Holonomic(Model):
         return body_of(self._settings, self._at.robot.name, "holonomic", TEAL, self._settings.speed)
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles."""
+        """Return its cylinder for obstacles."""
         return upright(self._settings)
 
     def place(self, view: WritableView) -> None:

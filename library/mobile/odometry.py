@@ -1,6 +1,6 @@
 """How far a rover's wheels have turned.
 
-What the wheels slip is in it, and what they turned while the rover was blocked: the wheels turned, it did not move.
+It includes the slip of the wheels, and their turning while the rover was blocked and did not move.
 """
 
 from __future__ import annotations

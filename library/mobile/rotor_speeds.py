@@ -23,7 +23,7 @@ Speeds = Annotated[tuple[RadiansPerSecond, ...], Meta(min_length=4, max_length=4
 
 
 class RotorSpeedsSettings(ActuatorSettings):
-    """Turns the rotors of a quadrotor; what they do is said by its model."""
+    """Turns the rotors of a quadrotor; its model has their thrust and drag."""
 
 
 class RotorSpeeds(Struct, frozen=True):
@@ -34,7 +34,7 @@ class RotorSpeeds(Struct, frozen=True):
 
 @actuator("rotor_speeds", RotorSpeedsSettings, RotorSpeeds, slots={"set_point": 4}, needs=("angular_velocity",))
 class RotorSpeedsActuator(Actuator):
-    """Rotors that keep the last speeds that they were told."""
+    """Rotors that keep the speeds of the last command."""
 
     def __init__(self, settings: RotorSpeedsSettings, at: Mounting) -> None:
         robot = at.spec.robots[at.robot.name]
@@ -57,7 +57,7 @@ class RotorSpeedsActuator(Actuator):
         view.write(self._set_point, 0.0, 0.0, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Turn the rotors unequally, for the small run that tells engines apart."""
+        """Turn the rotors unequally, for the run that compares engines."""
         view.write(self._set_point, *[share * self._speed_max for share in (0.70, 0.71, 0.69, 0.70)])
 
     def command(self, view: View) -> tuple[Motor, ...]:

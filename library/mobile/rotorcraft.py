@@ -12,7 +12,7 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.library.mobile.arcs import Floats, approached, approached_together, shorter, upright_turn, wrapped
-from foosim.library.mobile.asked import asked_of
+from foosim.library.mobile.set_points import set_points_of
 from foosim.library.mobile.vehicles import (
     Acceleration,
     Antenna,
@@ -86,10 +86,10 @@ class RotorcraftMotion(Motion):
 
     Over the ground and in height the speed that is wanted is the greatest from which a body that moves in steps of dt
     still stops at its goal, with a deceleration a. In m steps, each slower than the one before it by a dt, it covers d
-    = m v dt - a dt^2 m (m - 1) / 2; the last one is no faster than a dt where m is the least whole number that is not
-    below (sqrt(1 + 8 d / (a dt^2)) - 1) / 2. So v = d / (m dt) + a dt (m - 1) / 2.
+    = m v dt - a dt^2 m (m - 1) / 2; the last one is no faster than a dt where m is the least whole number of at
+    least (sqrt(1 + 8 d / (a dt^2)) - 1) / 2. So v = d / (m dt) + a dt (m - 1) / 2.
 
-    The velocity over the ground and that in height approach what is wanted by at most a dt each, where a is the
+    The velocity over the ground and that in height approach the wanted ones by at most a dt each, where a is the
     acceleration over the square root of 2: one is never kept from braking by the other. The heading turns the shorter
     way, at most so fast. A rotorcraft that is stopped by an obstacle (`moving.free_way`) has the velocity of the way
     that was left to it.
@@ -114,10 +114,10 @@ class RotorcraftMotion(Motion):
         batch, dt, count = self._batch, self._dt, len(entities)
         state = batch.state.read_at_start(view)
         place, velocity, heading = state[:, 0:3].copy(), state[:, 7:10].copy(), state[:, 13].copy()
-        asked = asked_of(motors, NO_GOAL)
+        set_points = set_points_of(motors, NO_GOAL)
         has_goal = np.array([bool(its) for its in motors])
-        goal, most = np.where(has_goal[:, None], asked[:, :3, 0], place), asked[:, :, 1]
-        yaw = np.where(has_goal, asked[:, 3, 0], heading)
+        goal, most = np.where(has_goal[:, None], set_points[:, :3, 0], place), set_points[:, :, 1]
+        yaw = np.where(has_goal, set_points[:, 3, 0], heading)
         near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
         for _ in range(self._substeps):
@@ -138,7 +138,7 @@ class RotorcraftMotion(Motion):
         batch.state.write(view, after)
 
     def _wanted(self, way: Floats, most: Floats) -> Floats:
-        """Return the velocities that are wanted of those who have this way to go (m)."""
+        """Return the wanted velocities for the ways that are left (m)."""
         level = _length(way[:, 0:2])
         along = np.where(level > 0.0, level, 1.0)
         share = self._fastest(level, most[:, 0]) / along
@@ -149,7 +149,7 @@ class RotorcraftMotion(Motion):
         return wanted
 
     def _fastest(self, way: Floats, most: Floats) -> Floats:
-        """Return the greatest speed from which who has this way to go still stops at its end."""
+        """Return the greatest speed that still allows a stop at the end of this way."""
         dt, brake = self._dt, self._batch.acceleration * EACH
         steps = np.maximum(np.ceil((np.sqrt(1.0 + 8.0 * way / (brake * dt * dt)) - 1.0) / 2.0), 1.0)
         found: Floats = np.minimum(way / (steps * dt) + brake * dt * (steps - 1.0) / 2.0, most)
@@ -194,7 +194,7 @@ class Rotorcraft(Model):
         return body_of(self._settings, self._at.robot.name, "rotorcraft", WHITE, self._fastest())
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles."""
+        """Return its cylinder for obstacles."""
         return upright(self._settings)
 
     def place(self, view: WritableView) -> None:

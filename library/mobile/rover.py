@@ -90,7 +90,7 @@ class Rover(Model):
         return replace(body, speed_limit=rover.drive.speed)
 
     def upright(self) -> Upright:
-        """Return what it is to obstacles: its hull, as high as it is with its antenna."""
+        """Return its cylinder for obstacles: its hull, up to the top of its antenna."""
         return Upright(self._rover.radius, 0.0, max(self._rover.height, self._rover.antenna_height))
 
     def wheels(self) -> Wheels:

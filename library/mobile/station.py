@@ -1,4 +1,4 @@
-"""A base station: an antenna at a place, and power for the rovers beside it."""
+"""A base station: an antenna at a place, and power for near rovers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GREEN: Final[Colour] = (0.15, 0.60, 0.30, 1.0)
 
 
 class StationRobot(RobotSettings):
-    """A base station: an antenna at a place, and power for the rovers beside it."""
+    """A base station: an antenna at a place, and power for near rovers."""
 
     x: Place
     y: Place
@@ -42,7 +42,7 @@ class Station(Model):
         return standing(self._name, "station", place, "fixed", shapes, station.antenna_height)
 
     def place(self, view: WritableView) -> None:
-        """It stands where its settings say."""
+        """It stands at the place of its settings."""
 
     def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
         """Nothing moves it."""

@@ -1,10 +1,10 @@
-"""How who goes to a place on the ground steers: towards it, and away from what its feelers meet. It plans nothing.
+"""Steering to a place on the ground: towards it, and away from what feelers meet, without a plan.
 
 The speed is that from which half of the acceleration stops at the place, v = sqrt(a d), and the turning likewise by the
 angle that is left. A ray of a feeler that points r from ahead, and meets something at a share s of its length, lets the
-robot turn its way to that side by no more than s 90 degrees - (1 - s) (120 degrees - r): what is far away hardly
-counts, and from what it touches it goes away. The ray takes (1 - s) cos r off the speed. Where both feelers ask for
-more than there is between them, the one that asks for more decides, the left one if they ask for the same.
+robot turn its way to that side by no more than s 90 degrees - (1 - s) (120 degrees - r): a far thing hardly
+counts, and a touched one turns the way off it. The ray takes (1 - s) cos r off the speed. Where both feelers together
+need more room than there is, the one that needs more decides, the left one if both need the same.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ TURN_GAIN: Final = 3.0
 """rad/s of turning per rad of error."""
 ACROSS_RAD: Final = pi / 2.0
 OFF_RAD: Final = 2.0 * pi / 3.0
-"""Where the robot has what it touches: a little behind."""
+"""The angle at which a touched thing is kept: a little behind."""
 AHEAD_RAD: Final = pi / 3.0
-"""Who cannot go aside turns on the spot as long as the place is not within this ahead."""
+"""A robot that cannot move sideways turns on the spot until the place is within this angle ahead."""
 RAYS: Final = 13
 """Of each feeler."""
 ASIDE: Final = 1.7
@@ -76,7 +76,7 @@ class Feelers:
     """The two feelers of one robot: level fans of rays from the middle of its hull, from ahead to the left and to the
     right, as far as 120 degrees.
 
-    A ray goes as far as the feelers are long, and no farther aside than `ASIDE` times the hull's half width: what the
+    A ray is as long as the feelers, and reaches no farther aside than `ASIDE` times the hull's half width: what the
     robot would pass does not count. It meets something at a share of the way from the hull to its end.
     """
 
@@ -96,7 +96,7 @@ class Feelers:
         self._ahead = np.array([cos(turn) for turn in self._turns])
 
     def felt(self, view: View, heading: float, reach_m: float) -> Felt:
-        """Return what they meet at the start of the tick; what is farther away than `reach_m` does not count."""
+        """Return what they meet at the start of the tick within `reach_m`."""
         place, _ = self._mount.pose(view.start)
         ways = np.array([(cos(heading + turn), sin(heading + turn), 0.0) for turn in self._turns])
         reaches = np.minimum(self._reaches, reach_m)

@@ -2,7 +2,7 @@
 
 The wheels' set-points are v - w track / 2 and v + w track / 2 (Siegwart, Nourbakhsh, Scaramuzza, *Introduction to
 Autonomous Mobile Robots*, section 3.2). Where a wheel would be faster than it can be, both are slower by one factor:
-the robot goes along the arc that was asked for.
+the robot moves along the requested arc.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
-    from foosim.library.mobile.asked import MotionsAsked
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
+    from foosim.library.mobile.set_points import MotionSetPoints
 
 
 class VWSettings(ActuatorSettings):
@@ -40,7 +40,7 @@ class MotionActuator(Actuator):
     """The two wheels of a robot, as one motion."""
 
     def __init__(self, settings: VWSettings, at: Mounting) -> None:
-        """Raises BadValue where the robot's model does not say what its wheels are."""
+        """Raises BadValue for a model without wheels."""
         self._wheels = wheels_of(at.spec, at.layout, at.robot)
         self._set_point = at.slot("set_point")
         self._at, self._half_track = self._set_point.at, self._wheels.track / 2.0
@@ -60,11 +60,11 @@ class MotionActuator(Actuator):
         view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Drive in a curve, for the small run that tells engines apart."""
+        """Drive in a curve, for the run that compares engines."""
         view.write(self._set_point, 0.5 * self._wheels.speed, 0.3 * self._wheels.turn_rate)
 
     def command(self, view: View) -> Motors:
-        """Return what is asked of the motors of the left and the right wheel (`Wheels.asked`)."""
+        """Return the set-points of the motors of the left and the right wheel (`Wheels.set_points`)."""
         linear, aside = view.numbers[self._at], view.numbers[self._at + 1] * self._half_track
         left, right = linear - aside, linear + aside
         most = self._wheels.speed
@@ -72,11 +72,11 @@ class MotionActuator(Actuator):
         if fastest > most:
             share = most / fastest
             left, right = left * share, right * share
-        return self._wheels.asked(left, right, view)
+        return self._wheels.set_points(left, right, view)
 
     @staticmethod
-    def together(actuators: Sequence[MotionActuator]) -> MotionsAsked:
+    def together(actuators: Sequence[MotionActuator]) -> MotionSetPoints:
         """Return these as one; their robots move by kinematics."""
-        from foosim.library.mobile.asked import MotionsAsked
+        from foosim.library.mobile.set_points import MotionSetPoints
 
-        return MotionsAsked([one._set_point for one in actuators], [one._wheels for one in actuators])
+        return MotionSetPoints([one._set_point for one in actuators], [one._wheels for one in actuators])

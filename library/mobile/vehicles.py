@@ -55,7 +55,7 @@ class Vehicle(RobotSettings):
 
 
 def upright(vehicle: Vehicle) -> Upright:
-    """Return what it is to obstacles: its hull, as high as it is with its antenna."""
+    """Return its cylinder for obstacles: its hull, up to the top of its antenna."""
     return Upright(vehicle.radius, 0.0, max(vehicle.height, vehicle.antenna_height))
 
 

@@ -47,7 +47,7 @@ class Waypoint(Struct, frozen=True):
     "waypoint", WaypointSettings, Waypoint, slots={"given": 1, "target": 4, **SLOTS}, needs=("arrived",), jobs=True
 )
 class WaypointActuator(Actuator):
-    """Keeps the last waypoint that it was told; without any the rotorcraft brakes, and hovers where it is."""
+    """Keeps the waypoint of the last command; without one the rotorcraft brakes, and hovers where it is."""
 
     def __init__(self, settings: WaypointSettings, at: Mounting) -> None:
         robot = at.spec.robots[at.robot.name]
@@ -78,12 +78,12 @@ class WaypointActuator(Actuator):
         self._set(view, x, y, z, view.read(self._heading)[0])
 
     def excite(self, view: WritableView) -> None:
-        """Fly askew and up, for the small run that tells engines apart."""
+        """Fly askew and up, for the run that compares engines."""
         x, y, z = view.read(self._position)
         self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)
 
     def progress(self, view: WritableView) -> JobState:
-        """Return whether it hovers at its waypoint; what is left is m and rad together, for it may only turn."""
+        """Return whether it hovers at its waypoint, by the way that is left (m and rad together)."""
         left = [there - now for there, now in zip(view.read(self._target), self._pose(view), strict=True)]
         x, y, z, yaw = left
         way = sqrt(x * x + y * y + z * z) + abs(shorter(yaw))

@@ -15,8 +15,8 @@ from foosim.world.forms.quantities import MetresPerSecond
 from foosim.world.forms.registry import actuator
 from foosim.world.forms.settings import ActuatorSettings
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
-    from foosim.library.mobile.asked import WheelSpeedsAsked
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
+    from foosim.library.mobile.set_points import WheelSetPoints
 
 
 class WheelSpeedsSettings(ActuatorSettings):
@@ -35,7 +35,7 @@ class DriveActuator(Actuator):
     """The two wheels of a robot."""
 
     def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
-        """Raises BadValue where the robot's model does not say what its wheels are."""
+        """Raises BadValue for a model without wheels."""
         self._wheels = wheels_of(at.spec, at.layout, at.robot)
         self._set_point, self._speed = at.slot("set_point"), self._wheels.speed
 
@@ -53,17 +53,17 @@ class DriveActuator(Actuator):
         view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Drive in a curve, for the small run that tells engines apart."""
+        """Drive in a curve, for the run that compares engines."""
         view.write(self._set_point, 0.3 + 0.01 * (self._set_point.at % 7), 0.4)
 
     def command(self, view: View) -> Motors:
-        """Return what is asked of the motors of the left and the right wheel (`Wheels.asked`)."""
+        """Return the set-points of the motors of the left and the right wheel (`Wheels.set_points`)."""
         left, right = view.read(self._set_point)
-        return self._wheels.asked(left, right, view)
+        return self._wheels.set_points(left, right, view)
 
     @staticmethod
-    def together(actuators: Sequence[DriveActuator]) -> WheelSpeedsAsked:
+    def together(actuators: Sequence[DriveActuator]) -> WheelSetPoints:
         """Return these as one; their robots move by kinematics."""
-        from foosim.library.mobile.asked import WheelSpeedsAsked
+        from foosim.library.mobile.set_points import WheelSetPoints
 
-        return WheelSpeedsAsked([one._set_point for one in actuators], [one._wheels for one in actuators])
+        return WheelSetPoints([one._set_point for one in actuators], [one._wheels for one in actuators])

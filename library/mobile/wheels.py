@@ -1,4 +1,4 @@
-"""Two driven wheels, as motions and actuators ask for them: a model that has such says so by its method `wheels()`."""
+"""Two driven wheels, for motions and actuators: the method `wheels()` of a model returns them."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Wheels:
     slips: tuple[float, float] = (0.0, 0.0)
     motors: WheelMotors | None = None
 
-    def asked(self, left: float, right: float, view: View) -> Motors:
-        """Return what is asked of the motors of both wheels, so that their rims approach these speeds (m/s).
+    def set_points(self, left: float, right: float, view: View) -> Motors:
+        """Return the set-points of the motors of both wheels, so that their rims approach these speeds (m/s).
 
-        A motion is asked for the speeds themselves, with the greatest acceleration. A joint's motor is asked for the
-        speed that its wheel can have after the tick, with the greatest torque: where that is not enough, as in front of
-        a wall, the next tick goes on from the speed that there is.
+        A motion gets the speeds themselves, with the greatest acceleration. A joint's motor gets the speed that its
+        wheel can have after the tick, with the greatest torque: where that is too little, as in front of a wall, the
+        next tick continues from the actual speed.
         """
         motors = self.motors
         if motors is None:
@@ -59,11 +59,11 @@ class Wheels:
 
 
 def wheels_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Wheels:
-    """Return the wheels of an entity. Raises BadValue where its model does not say what they are."""
+    """Return the wheels of an entity. Raises BadValue for a model that does not define them."""
     model: Any = made_model(spec, layout, entity)
     found: Wheels | None = model.wheels()
     if found is None:
-        raise BadValue("a model with wheel_speeds, and without a method wheels that says what they are", entity.model)
+        raise BadValue("a model with wheel_speeds needs a method wheels that returns them", entity.model)
     return found
 
 

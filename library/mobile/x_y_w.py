@@ -1,4 +1,4 @@
-"""A base that goes in any direction, by its velocity in its own frame and how fast it turns."""
+"""Velocity of a base that moves in any direction: in its own frame, and about its axis."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Velocity(Struct, frozen=True):
 
 @actuator("x_y_w", XYWSettings, Velocity, slots={"set_point": 3}, needs=("base_velocity",))
 class VelocityActuator(Actuator):
-    """The drive of a base, which keeps the last velocity that it was told."""
+    """The drive of a base, which keeps the velocity of the last command."""
 
     def __init__(self, settings: XYWSettings, at: Mounting) -> None:
         robot = at.spec.robots[at.robot.name]
@@ -44,7 +44,7 @@ class VelocityActuator(Actuator):
         return {"x": (-speed, speed), "y": (-speed, speed), "angular": (-rate, rate)}
 
     def within(self, command: Velocity) -> Velocity:
-        """Return a velocity that is no faster than the base, in the direction that was asked for."""
+        """Return the requested velocity, shortened to the greatest speed of the base."""
         x, y, most = command.x, command.y, self._speed
         if x * x + y * y <= most * most:
             return command
@@ -61,7 +61,7 @@ class VelocityActuator(Actuator):
         view.write(self._set_point, 0.0, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Go askew in a curve, for the small run that tells engines apart."""
+        """Go askew in a curve, for the run that compares engines."""
         view.write(self._set_point, 0.5 * self._speed, 0.3 * self._speed, 0.3 * self._turn_rate)
 
     def command(self, view: View) -> tuple[tuple[float, float], ...]:

@@ -14,12 +14,12 @@ from foosim.world.forms.settings import SensorSettings
 
 
 class ContactSettings(SensorSettings):
-    """Measures touches at its rate, and besides at each tick at whose start a touch has begun in the tick before."""
+    """Measures touches at its rate, and also at each tick after one in which a touch has begun."""
 
 
 class Touches(Struct, frozen=True):
-    """The touches of a robot in the last tick: the `count` of those that began, the sum of the normal impulses, and the
-    last substep, counted from 0, in which anything was touched; -1 where nothing was."""
+    """The touches of a robot in the last tick: the `count` of new ones, the sum of the normal impulses, and the last
+    substep with a touch, counted from 0; -1 for none."""
 
     count: Count
     impulse: NewtonSeconds

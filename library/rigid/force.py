@@ -42,7 +42,7 @@ class Push(Struct, frozen=True):
 
 @actuator("force", ForceSettings, Push, slots={"set_point": 6}, needs=("angular_velocity",), moves=False)
 class ForceActuator(Actuator):
-    """Pushes with the last force and torque that it was told, throughout each tick."""
+    """Applies the force and torque of the last command throughout each tick."""
 
     def __init__(self, settings: ForceSettings, at: Mounting) -> None:
         self._force, self._torque = settings.force, settings.torque
@@ -65,7 +65,7 @@ class ForceActuator(Actuator):
         view.write(self._set_point, *[0.0] * 6)
 
     def excite(self, view: WritableView) -> None:
-        """Push a little, for the small run that tells engines apart."""
+        """Push a little, for the run that compares engines."""
         view.write(self._set_point, *[0.1 * self._force] * 3, *[0.1 * self._torque] * 3)
 
     def command(self, view: View) -> tuple[Motor, ...]:

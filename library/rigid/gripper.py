@@ -1,7 +1,7 @@
-"""A gripper: it takes an object that is near a place on a link, and holds it as it is.
+"""A gripper: it takes an object that is near a place on a link, and holds it in its pose.
 
-A grasp is a weld between the link and the object, of the engine. The frame has what is held and its pose in the frame
-of the link at the grasp; so whoever solves the two next holds them by the same.
+A grasp is a weld of the engine between the link and the object. The frame has the held object and its pose in the
+frame of the link at the grasp; so each node that solves the two next has the same weld.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HALF: Final = 0.5
 
 
 class GraspFailure(IntEnum):
-    """Why a gripper took nothing when it was last told to close."""
+    """Why a gripper took nothing at the last command to close."""
 
     NONE = 0
     OUT_OF_REACH = 1
@@ -56,7 +56,7 @@ class Grip(Struct, frozen=True):
     jobs=True,
 )
 class Gripper(Actuator):
-    """Takes the nearest object in its reach when it is told to close, and lets it go when it is told to open.
+    """Takes the nearest object in its reach at a command to close, and releases it at a command to open.
 
     A job to close is done when it holds something, and fails where it can take nothing; one to open is done at once.
     """
@@ -76,10 +76,10 @@ class Gripper(Actuator):
         self._held, self._grasp = at.slot("held"), at.slot("grasp")
         self._wanted, self._failure = at.slot("wanted"), at.slot(FAILURE)
         self._quarantined = at.slot("quarantined")
-        self._objects = [(one, self._misfit(one)) for one in portables_of(at.spec, at.layout)]
+        self._objects = [(one, self._mismatch(one)) for one in portables_of(at.spec, at.layout)]
         """Each with the reason why it can never be taken."""
 
-    def _misfit(self, one: Portable) -> GraspFailure:
+    def _mismatch(self, one: Portable) -> GraspFailure:
         settings = self._settings
         if settings.tag is not None and settings.tag not in one.tags:
             return GraspFailure.NO_TAG
@@ -89,7 +89,7 @@ class Gripper(Actuator):
 
     @staticmethod
     def check(settings: GripperSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a link that is not there, an engine without grasps, a robot that it does not
+        """Raise IncompatibleComponent for an unknown link, an engine without grasps, a robot that it does not
         solve."""
         having = [name for name in registry.engines() if ENGINES[name].grasps]
         if not at.spec.engine_type.grasps:
@@ -105,7 +105,7 @@ class Gripper(Actuator):
         return {"closed": (0.0, 1.0)}
 
     def accept(self, command: Grip, view: WritableView) -> bool:
-        """Close or open. A robot in quarantine, which nobody solves, does neither."""
+        """Close or open. A robot in quarantine, which no node solves, does neither."""
         if view.read(self._quarantined)[0] > 0.0:
             view.write(self._failure, GraspFailure.QUARANTINED)
             return False
@@ -120,7 +120,7 @@ class Gripper(Actuator):
         return True
 
     def progress(self, view: WritableView) -> JobState:
-        """Return whether it holds something, or nothing, as it was told."""
+        """Return DONE if it holds something after a command to close, nothing after one to open; else FAILED."""
         is_holding = view.read(self._held)[0] != NO_ENTITY
         return JobState.DONE if is_holding == (view.read(self._wanted)[0] == 1.0) else JobState.FAILED
 
@@ -131,13 +131,13 @@ class Gripper(Actuator):
         _, position, orientation = forward_kinematics(self._body, self._robot, start)[self._link]
         point = moved(position, rotate(orientation, settings.at.position), 1.0)
         near = []
-        for one, misfit in self._objects:
+        for one, mismatch in self._objects:
             if one.entity.is_absent(start):
                 continue
             way = distance_from(one, start, point, settings.reach)
             if way is not None:
                 is_quarantined = start[one.entity.offsets["quarantined"]] > 0.0
-                failure = misfit or (GraspFailure.QUARANTINED if is_quarantined else GraspFailure.NONE)
+                failure = mismatch or (GraspFailure.QUARANTINED if is_quarantined else GraspFailure.NONE)
                 near.append((failure != GraspFailure.NONE, way, one.entity.name, failure, one.entity))
         if not near:
             return GraspFailure.OUT_OF_REACH
@@ -149,10 +149,10 @@ class Gripper(Actuator):
         return failure
 
     def hold(self, view: WritableView) -> None:
-        """Leave all as it is: what is held is held without power, too."""
+        """Leave all as it is: a gripper holds without power, too."""
 
     def excite(self, view: WritableView) -> None:
-        """Close, for the small run that tells engines apart."""
+        """Close, for the run that compares engines."""
         self.accept(Grip(1.0), view)
 
     def command(self, view: View) -> Motors:

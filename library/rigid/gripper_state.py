@@ -21,7 +21,7 @@ class GripperStateSettings(SensorSettings):
 
 
 class GripperState(Struct, frozen=True):
-    """Whether a gripper was told to close, whether it holds something (1 or 0), and the mass of that (0 of nothing)."""
+    """Whether the last command to a gripper was to close, whether it holds something (1 or 0), and the held mass."""
 
     closed: Share
     holding: Share
@@ -30,7 +30,7 @@ class GripperState(Struct, frozen=True):
 
 @sensor("gripper_state", GripperStateSettings, GripperState)
 class GripperSensor(Sensor):
-    """Whether a gripper is told to close, whether it holds something, and the mass of that."""
+    """Whether the last command to a gripper was to close, whether it holds something, and the held mass."""
 
     def __init__(self, settings: GripperStateSettings, at: Mounting) -> None:
         offsets, name = at.robot.offsets, settings.gripper

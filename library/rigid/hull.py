@@ -23,7 +23,7 @@ Corner = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
 @lru_cache(maxsize=64)
 def _hull(corners: tuple[tuple[float, ...], ...]) -> Mesh:
-    import numpy as np  # for those who make bodies
+    import numpy as np  # only where bodies are built
 
     from foosim.world.bodies.hull import convex_hull
 

@@ -53,7 +53,7 @@ class JointPositionActuator(Actuator):
         return tuple(zip(self._group.lows, self._group.highs, strict=True))
 
     def names(self) -> tuple[str, ...]:
-        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        """Return the names of the numbers of a command: the links on the joints."""
         return self._group.names
 
     def accept(self, command: JointPositions, view: WritableView) -> bool:
@@ -66,7 +66,7 @@ class JointPositionActuator(Actuator):
         view.write(self._group.set_point, *self._group.positions(view))
 
     def excite(self, view: WritableView) -> None:
-        """Move each joint by a little, for the small run that tells engines apart."""
+        """Move each joint by a little, for the run that compares engines."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 
     def command(self, view: View) -> Motors:

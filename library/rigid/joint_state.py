@@ -41,7 +41,7 @@ class JointState(Struct, frozen=True):
 
 
 def joints_of(settings: JointStateSettings, counts: Mapping[str, int]) -> int:
-    """Return how many joints are measured, of a robot whose fields have so many numbers."""
+    """Return the count of measured joints; `counts` are the sizes of the robot's fields."""
     return len(settings.joints) or counts["joint_positions"]
 
 

@@ -25,7 +25,7 @@ class JointEfforts(Struct, frozen=True):
     "joint_torque", JointTorqueSettings, JointEfforts, slots=set_points, needs=("joint_positions",), joints="joints"
 )
 class JointTorqueActuator(Actuator):
-    """Motors that apply the last efforts that they were told, up to the greatest speeds of their joints."""
+    """Motors that apply the efforts of the last command, up to the greatest speeds of their joints."""
 
     def __init__(self, settings: JointTorqueSettings, at: Mounting) -> None:
         self._group = JointGroup(settings, at)
@@ -44,7 +44,7 @@ class JointTorqueActuator(Actuator):
         return tuple((-force, force) for force in self._group.forces)
 
     def names(self) -> tuple[str, ...]:
-        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        """Return the names of the numbers of a command: the links on the joints."""
         return self._group.names
 
     def accept(self, command: JointEfforts, view: WritableView) -> bool:
@@ -57,7 +57,7 @@ class JointTorqueActuator(Actuator):
         view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
 
     def excite(self, view: WritableView) -> None:
-        """Push each joint a little, for the small run that tells engines apart."""
+        """Push each joint a little, for the run that compares engines."""
         view.write(self._group.set_point, *[min(0.01, force) for force in self._group.forces])
 
     def command(self, view: View) -> Motors:

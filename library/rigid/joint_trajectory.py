@@ -1,4 +1,4 @@
-"""Joints along positions at times: what a planner of arms returns. A job is done when the last of them is reached."""
+"""Joints along positions at times, as from a planner of arms. A job is done when the last of them is reached."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Time = Annotated[float, Meta(gt=0.0, le=1e6, extra={"unit": "s"})]
 
 
 class TrajectoryFailure(IntEnum):
-    """Why joints do not follow, or have not followed, the way that they were told last."""
+    """Why joints do not follow, or have not followed, the trajectory of the last command."""
 
     NONE = 0
     POINTS = 1
@@ -39,7 +39,7 @@ class TrajectoryFailure(IntEnum):
 
 
 class JointTrajectorySettings(JointLoopSettings):
-    """Moves joints along points in time, of which a command has at most `points`.
+    """Moves joints along points in time, at most `points` for each command.
 
     Each joint moves at the speed of its way, and by `gain` times its distance from that. A job is done when the last
     time is over and each joint is within `tolerance` (m or rad) of its last position. It has failed `patience` later.
@@ -112,11 +112,11 @@ class JointTrajectory(Actuator):
         JointGroup(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
-        """Return no bounds: what is beyond those of a joint is refused."""
+        """Return no bounds: points beyond the limits of a joint are refused."""
         return {}
 
     def problem(self, command: Trajectory) -> str:
-        """Return why a command is refused wherever the joints are; empty for one that is not."""
+        """Return why a command is refused for any state of the joints; empty for a valid one."""
         return self._refusal(command)[1]
 
     def _refusal(self, command: Trajectory) -> tuple[TrajectoryFailure, str]:
@@ -137,7 +137,7 @@ class JointTrajectory(Actuator):
         return TrajectoryFailure.NONE, ""
 
     def accept(self, command: Trajectory, view: WritableView) -> bool:
-        """Take points; False: they are none, or a joint cannot be as fast."""
+        """Take points; False if they are invalid or too fast for a joint."""
         failure, _ = self._refusal(command)
         start, times = self._group.positions(view), (0.0, *command.times)
         if failure == TrajectoryFailure.NONE:
@@ -161,7 +161,7 @@ class JointTrajectory(Actuator):
         view.write(self._group.set_point, *self._group.positions(view))
 
     def excite(self, view: WritableView) -> None:
-        """Move each joint by a little, for the small run that tells engines apart."""
+        """Move each joint by a little, for the run that compares engines."""
         view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 
     def progress(self, view: WritableView) -> JobState:
@@ -191,7 +191,7 @@ class JointTrajectory(Actuator):
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor.
 
-        The loop's set-point leads the way by what makes a joint that is on it as fast as it.
+        The loop's set-point leads the way so far that a joint on the way has its speed.
         """
         times, ways = self._way(view)
         since_s, lead = self._since_s(view, view.tick), 1.0 / (self._gain * self._tick_s)

@@ -1,4 +1,4 @@
-"""Joints at speeds: what a motor with a speed controller does."""
+"""Joints at speeds, as by motors with speed controllers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class JointVelocities(Struct, frozen=True):
     joints="joints",
 )
 class JointVelocityActuator(Actuator):
-    """Motors that keep the last speeds that they were told."""
+    """Motors that keep the speeds of the last command."""
 
     def __init__(self, settings: JointVelocitySettings, at: Mounting) -> None:
         self._group = JointGroup(settings, at)
@@ -49,7 +49,7 @@ class JointVelocityActuator(Actuator):
         return tuple((-speed, speed) for speed in self._group.speeds)
 
     def names(self) -> tuple[str, ...]:
-        """Return what the numbers of a command are of, by the links that hang on the joints."""
+        """Return the names of the numbers of a command: the links on the joints."""
         return self._group.names
 
     def accept(self, command: JointVelocities, view: WritableView) -> bool:
@@ -62,7 +62,7 @@ class JointVelocityActuator(Actuator):
         view.write(self._group.set_point, *[0.0] * self._group.set_point.size)
 
     def excite(self, view: WritableView) -> None:
-        """Turn each joint a little, for the small run that tells engines apart."""
+        """Turn each joint a little, for the run that compares engines."""
         view.write(self._group.set_point, *[0.2] * self._group.set_point.size)
 
     def command(self, view: View) -> Motors:

@@ -1,4 +1,4 @@
-"""Actuators of joints: which joints of a robot one drives, and what these can do."""
+"""Actuators of joints: the driven joints of a robot and their limits."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class JointLoopSettings(JointSettings):
 def set_points(settings: JointSettings, carrier: Carrier) -> Mapping[str, int]:
     """Return the slots of an actuator of joints: a set-point for each. Raises BadValue for a robot without joints."""
     if carrier.joints == 0:
-        raise BadValue("an actuator of joints on a robot without any", settings.kind)
+        raise BadValue("the robot has no joints", settings.kind)
     if settings.joints is None:
         return {"set_point": carrier.joints}
     if len(settings.joints) > carrier.joints or len(set(settings.joints)) < len(settings.joints):

@@ -52,7 +52,7 @@ def _slots(settings: LookAtSettings, carrier: Carrier) -> Mapping[str, int]:
 
 @actuator("look_at", LookAtSettings, Sight, slots=_slots, needs=("joint_positions",), joints="joints", jobs=True)
 class LookAt(Actuator):
-    """Keeps the last place that it was told, and turns towards it.
+    """Keeps the place of the last command, and turns towards it.
 
     Pan turns by the angle about its axis between where it looks and the place, tilt by that between their heights. Both
     are exact for axes at right angles to each other, and that of tilt to the view; where the joints are apart, or the
@@ -69,7 +69,7 @@ class LookAt(Actuator):
 
     @staticmethod
     def check(settings: LookAtSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for joints that are no pan and tilt, and a link that these do not turn."""
+        """Raise IncompatibleComponent for joints other than pan and tilt, and a link that these do not turn."""
         its = LookAt(settings, at)
         if not hangs_on(its._body, its._eye, its._tilt):
             raise IncompatibleComponent(("at", "link"), "its joints do not turn this link", settings.at.link)
@@ -92,11 +92,11 @@ class LookAt(Actuator):
         self._progress.begin(view)
 
     def excite(self, view: WritableView) -> None:
-        """Turn a little, for the small run that tells engines apart."""
+        """Turn a little, for the run that compares engines."""
         view.write(self._group.set_point, *[angle + 0.2 for angle in self._group.positions(view)])
 
     def progress(self, view: WritableView) -> JobState:
-        """Return whether it looks at the place; what is left is the way of both joints (rad), maybe the long one."""
+        """Return whether it looks at the place, by the way of both joints that is left (rad), maybe the long one."""
         _, ahead, way = self._sight(view)
         aside, angles = cross(ahead, way), self._group.positions(view)
         angle = atan2(sqrt(dot(aside, aside)), dot(ahead, way))

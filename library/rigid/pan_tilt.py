@@ -39,7 +39,7 @@ class PanTiltSettings(JointLoopSettings):
 
 
 def pan_tilt_slots(settings: PanTiltSettings, carrier: Carrier) -> Mapping[str, int]:
-    """Return the slots of what drives them. Raises BadValue."""
+    """Return the slots of their drives. Raises BadValue."""
     return {**loop_points(settings, carrier), **SLOTS}
 
 
@@ -52,7 +52,7 @@ def pan_tilt_of(settings: PanTiltSettings, at: Mounting) -> JointGroup:
         raise IncompatibleComponent((path,), "two joints that turn are valid, pan and tilt", names)
     pan, tilt = (body.links.index(link) for link in group.links)
     if not hangs_on(body, tilt, pan):
-        raise IncompatibleComponent((path,), "the second one hangs on the first: pan, then tilt", names)
+        raise IncompatibleComponent((path,), "the second joint must be on the first: pan, then tilt", names)
     return group
 
 
@@ -81,7 +81,7 @@ class PanTiltAngles(Struct, frozen=True):
     jobs=True,
 )
 class PanTilt(Actuator):
-    """Keeps the last angles that it was told: a proportional loop, as that of `joint_position`."""
+    """Keeps the angles of the last command by a proportional loop, as `joint_position` does."""
 
     def __init__(self, settings: PanTiltSettings, at: Mounting) -> None:
         self.group, self._settings = pan_tilt_of(settings, at), settings
@@ -89,7 +89,7 @@ class PanTilt(Actuator):
 
     @staticmethod
     def check(settings: PanTiltSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for joints that are not two, do not turn, or do not hang on each other."""
+        """Raise IncompatibleComponent unless there are two joints that turn, one on the other."""
         pan_tilt_of(settings, at)
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -111,7 +111,7 @@ class PanTilt(Actuator):
         self._set(view, self.group.positions(view))
 
     def excite(self, view: WritableView) -> None:
-        """Turn a little, for the small run that tells engines apart."""
+        """Turn a little, for the run that compares engines."""
         self._set(view, [angle + 0.2 for angle in self.group.positions(view)])
 
     def progress(self, view: WritableView) -> JobState:

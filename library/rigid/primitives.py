@@ -1,4 +1,4 @@
-"""Rigid objects of one shape: their settings, and what their models have in common."""
+"""Rigid objects of one shape: their settings, and the common part of their models."""
 
 from __future__ import annotations
 
@@ -79,6 +79,6 @@ class RigidObject(Model):
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
     def excite(self, view: WritableView) -> None:
-        """Push and turn it, for the small run that tells engines apart."""
+        """Push and turn it, for the run that compares engines."""
         view.write(self._at.slot("linear_velocity"), 0.3, 0.2, 0.1)
         view.write(self._at.slot("angular_velocity"), 0.5, -0.3, 1.0)

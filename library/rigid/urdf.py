@@ -65,7 +65,7 @@ class UrdfRobot(RobotSettings):
 def robot_of(settings: UrdfRobot, spec: WorldSpec) -> Robot:
     """Return the robot in the file that settings name. Raises BadValue where that was not given."""
     if settings.file not in spec.asset_files:
-        raise BadValue("a URDF file whose content is not there", settings.file)
+        raise BadValue("the content of the URDF file is missing", settings.file)
     return read_urdf(settings.file, spec.asset_files)
 
 
@@ -97,7 +97,7 @@ class Urdf(Model):
         )
 
     def body(self) -> Body:
-        """Return links and shapes as the file says."""
+        """Return the links and shapes of the file."""
         return self._body
 
     def place(self, view: WritableView) -> None:
@@ -112,7 +112,7 @@ class Urdf(Model):
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
     def excite(self, view: WritableView) -> None:
-        """Set it in motion, for the small run that tells engines apart."""
+        """Set it in motion, for the run that compares engines."""
         if self._body.is_free:
             view.write(self._at.slot("linear_velocity"), 0.5, 0.2, 0.0)
         if self._body.joints:

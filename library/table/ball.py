@@ -81,7 +81,7 @@ class Ball(Model):
             raise BadValue(f"a place outside of the table: {valid}", ", ".join(f"{value:g} m" for value in position))
 
     def excite(self, view: WritableView) -> None:
-        """Kick it, for the small run that tells engines apart."""
+        """Kick it, for the run that compares engines."""
         view.write(self._at.slot("linear_velocity"), 1.0, 0.3, 0.0)
 
     def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:

@@ -25,11 +25,11 @@ Impulses = Annotated[tuple[NewtonSeconds, ...], Meta(min_length=TOUCHES_MAX, max
 
 
 class FigureContactSettings(SensorSettings):
-    """Tells of contacts at its rate, and besides at each tick at whose start one has begun in the tick before."""
+    """Reports contacts at its rate, and also at each tick after one in which a contact has begun."""
 
 
 class FigureTouches(Struct, frozen=True):
-    """The contacts of a rod in the last tick, at most two: the `count` of those that began, and of each its ball, its
+    """The contacts of a rod in the last tick, at most two: the `count` of new ones, and of each its ball, its
     figure, the substep in which it began, and the sum of the normal impulses, in the order in which they began.
 
     Balls are counted from 0 in the order of their names, figures from 0 in that of their y; -1 is no ball, and the

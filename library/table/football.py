@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 OF_BALL: Final = {"still_ticks": 1, "out_ticks": 1, "wait_ticks": 1, "spot": 2, "serve": 1, "touched_by": ENTITY}
 """Ticks that a ball has been at rest or off the table, and that it still has to wait for its kick-off; where that is
-(x, y) and towards which end (-1, 1, or 0 where a draw says it); and the rod that touched it last since then."""
+(x, y) and towards which end (-1, 1, or 0 for a draw); and the rod that touched it last since then."""
 OF_WORLD: Final = {"score": 2, "own_goals": 2, "kickoffs": 1, "played_ticks": 1, "is_over": 1, "over_since": 1}
 """Goals of red and blue, own goals of their figures, kick-offs; ticks with a ball in play; whether the match is over,
 and since which tick."""
@@ -134,8 +134,8 @@ class Football(Rule):
         self._count_still(ball, view, x, y)
 
     def _count_goal(self, ball: _Ball, team: int, view: WritableView) -> None:
-        """A goal counts for the team that attacks it, whoever touched the ball last; if that was a rod of the other
-        team, it is that team's own goal."""
+        """A goal counts for the team that attacks it; after a last touch by the other team it is that team's own
+        goal."""
         other = 1 - team
         view.write(self._score, *_one_more(view.read(self._score), team))
         if self._touches.team_of(view.numbers[ball.touched_by.at]) == other:
@@ -179,7 +179,7 @@ class Football(Rule):
         view.write(ball.serve, serve)
 
     def _kick_off(self, ball: _Ball, view: WritableView) -> None:
-        """Roll the ball from where it waits; a direction of which nothing is said is drawn by the kick-off's number."""
+        """Roll the ball from where it waits; an unset direction is drawn by the kick-off's number."""
         (kickoffs,) = view.read(self._kickoffs)
         words = draw_words(self._key, int(kickoffs))
         view.write(self._kickoffs, kickoffs + 1.0)
@@ -227,10 +227,10 @@ class Football(Rule):
         end = "" if not status["is_over"] else f", {status['winner']} has won" if status["winner"] else ", a draw"
         return f"{red} {ours} : {theirs} {blue}{end}"
 
-    # --- what happened -----------------------------------------------------------------------------------------------
+    # --- events ------------------------------------------------------------------------------------------------------
 
     def marks(self, before: Frame, after: Frame) -> Iterator[Marked]:
-        """Yield goals, kick-offs and why balls came back, to the tick: what was counted says when it began."""
+        """Yield goals, kick-offs and why balls came back, to the tick, by the counted ticks."""
         wait = f"{self._name}.wait_ticks"
         returned: list[tuple[int, str]] = []
         kickoffs = 0
@@ -287,7 +287,7 @@ class Football(Rule):
 
 
 class _Ball:
-    """Where a ball's numbers are, and what the rules remember of it."""
+    """The places of a ball's numbers, and of the rules' memory of it."""
 
     def __init__(self, at: RuleMounting, entity: Entity) -> None:
         self.entity = entity
@@ -300,7 +300,7 @@ class _Ball:
         self._model = Ball(None, mounting_of(at.spec, at.layout, entity))
 
     def place(self, view: WritableView, position: Vector, velocity: Vector = ORIGIN) -> None:
-        """Set it to a place (m) with a velocity (m/s), and forget what was counted, and who touched it."""
+        """Set it to a place (m) with a velocity (m/s), and reset its counts and its last touch."""
         self._model.place_at(view, position, velocity)
         for slot in (self.still, self.out, self.wait):
             view.write(slot, 0.0)
@@ -308,7 +308,7 @@ class _Ball:
 
 
 class _Touches:
-    """Which rod has touched a ball: what the contact logs of the last tick tell.
+    """Which rod has touched a ball, by the contact logs of the last tick.
 
     A rod touches nothing but balls. So where a ball has a contact and one rod has, too, they are each other's, and the
     ball is within the rod's reach. Of several such rods it is the one that was in contact last, to the substep; of

@@ -28,7 +28,7 @@ _TO_CORNER: Final[dict[tuple[float, float], tuple[float, float]]] = {
 
 
 class FootballTableSettings(SceneSettings):
-    """The table without what moves."""
+    """The table without rods and balls."""
 
     field: Playfield
     floor: Floor

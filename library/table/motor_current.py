@@ -15,7 +15,7 @@ from foosim.world.forms.quantities import Amperes
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
     import numpy as np
     from numpy.typing import NDArray
 
@@ -84,7 +84,7 @@ def _constants(settings: MotorCurrentSettings, at: Mounting) -> tuple[float, flo
     found = []
     for number, (key, own) in enumerate((("slide", settings.slide), ("spin", settings.spin))):
         if own is None and not motors:
-            what = f"nothing says how much a current moves: {key} is needed, or an actuator rod_voltage"
+            what = f"the force of a current is unknown: set {key}, or give an actuator rod_voltage"
             raise IncompatibleComponent(("kind",), what, settings.kind)
         found.append(motors[0][number] if own is None else own)
     return found[0], found[1]

@@ -1,4 +1,4 @@
-"""A motorised rod of the football table with its figures: what slides and turns about one axis."""
+"""A motorised rod of the football table with its figures, which slides and turns about one axis."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _rotors(settings: RodRobot) -> tuple[float, float]:
 
 
 def figure_ys(line: Line) -> list[float]:
-    """Return where a line's figures stand along their rod, from its middle."""
+    """Return the places of a line's figures along their rod, from its middle."""
     return [(index - (line.figures - 1) / 2.0) * line.pitch for index in range(line.figures)]
 
 

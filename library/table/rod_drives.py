@@ -106,12 +106,12 @@ class RodCommand(Protocol):
 
 
 class RodSetPoint(Actuator):
-    """What the last command asked of a rod's motors, in the slot `set_point`: two numbers, each within its bounds."""
+    """The last command to a rod's motors, in the slot `set_point`: two numbers, each within its bounds."""
 
     steady: ClassVar = True
-    """What it asks follows from the state of its rod alone."""
+    """Its set-points follow from the state of its rod alone."""
     excites: ClassVar = (0.1, 0.5)
-    """Shares of the bounds that `excite` asks for."""
+    """Shares of the bounds that `excite` sets."""
 
     def __init__(self, at: Mounting, bounds: tuple[float, float]) -> None:
         """`bounds` are the greatest numbers of slide and spin in either direction, in the units of the command."""
@@ -128,9 +128,9 @@ class RodSetPoint(Actuator):
         return True
 
     def hold(self, view: WritableView) -> None:
-        """Ask for nothing: a speed of 0, no force, or motors that are shorted, which brakes them."""
+        """Set all to 0: a speed of 0, no force, or shorted motors, which brake."""
         view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
-        """Slide and turn, for the small run that tells engines apart."""
+        """Slide and turn, for the run that compares engines."""
         view.write(self._set_point, *[share * most for share, most in zip(self.excites, self._bounds, strict=True)])

@@ -28,7 +28,7 @@ class RodForce(Struct, frozen=True):
 
 @actuator("rod_force", RodForceSettings, RodForce, slots={"set_point": 2}, needs=("joint_positions",), kit="table")
 class ForceActuator(RodSetPoint):
-    """Motors that give the force and the torque that they were told last, up to their greatest speeds."""
+    """Motors that apply the force and the torque of the last command, up to their greatest speeds."""
 
     excites: ClassVar = (0.1, 0.1)
 

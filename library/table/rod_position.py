@@ -45,7 +45,7 @@ class PositionActuator(Actuator):
     """A proportional loop from a rod's set-point to the speeds of its motors."""
 
     steady: ClassVar = True
-    """What it asks follows from the state of its rod alone."""
+    """Its set-points follow from the state of its rod alone."""
 
     def __init__(self, settings: RodPositionSettings, at: Mounting) -> None:
         drive, limits = table_of(at.spec).drive, RodLimits(at)
@@ -70,7 +70,7 @@ class PositionActuator(Actuator):
         view.write(self._set_point, *view.read(self._joints))
 
     def excite(self, view: WritableView) -> None:
-        """Turn, for the small run that tells engines apart."""
+        """Turn, for the run that compares engines."""
         view.write(self._set_point, 0.0, 1.0)
 
     def command(self, view: View) -> tuple[tuple[float, float], ...]:

@@ -27,7 +27,7 @@ class RodVoltages(Struct, frozen=True):
     "rod_voltage", RodVoltageSettings, RodVoltages, slots={"set_point": 2}, needs=("joint_positions",), kit="table"
 )
 class VoltageActuator(RodSetPoint):
-    """Motors with the voltages that they were told last; a dead time is the modifier `delay`."""
+    """Motors at the voltages of the last command; a dead time is the modifier `delay`."""
 
     def __init__(self, settings: RodVoltageSettings, at: Mounting) -> None:
         slide, spin = settings.slide, settings.spin

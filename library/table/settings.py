@@ -160,7 +160,7 @@ FIGURES_MAX: Final = PRIMITIVES_MAX // 2
 
 
 class Line(SpecBase):
-    """One of a team's four lines: where its rod stands for red (blue's is mirrored) and what is on it."""
+    """One of a team's four lines: the place of its rod for red (blue's is mirrored) and its parts."""
 
     x: Position
     figures: Annotated[int, Field(ge=1, le=FIGURES_MAX)]
@@ -171,7 +171,7 @@ class Line(SpecBase):
 class SlideAxis(SpecBase):
     """A rod's motor along y: target speed = gain (1/s) x error, within +-speed, at no more than the force.
 
-    Nor more than what accelerates the rod by `acceleration` without a load, where that is given.
+    Nor more than accelerates the rod by `acceleration` without a load, where that is given.
     """
 
     speed: Speed
@@ -183,7 +183,7 @@ class SlideAxis(SpecBase):
 class SpinAxis(SpecBase):
     """A rod's motor around y: target speed = gain (1/s) x error, within +-speed, at no more than the torque.
 
-    Nor more than what accelerates the rod by `acceleration` without a load, where that is given.
+    Nor more than accelerates the rod by `acceleration` without a load, where that is given.
     """
 
     speed: Spin
@@ -200,7 +200,7 @@ class Drive(SpecBase):
 
 
 class Match(SpecBase):
-    """When a match ends: after so much time with a ball in play, or when a team has so many goals, whichever is first.
+    """When a match ends: after `duration` with a ball in play or with `goals` of a team, whichever is first.
 
     Without `duration` there is no limit of time, without `goals` none of goals.
     """
@@ -229,7 +229,7 @@ class Rules(SpecBase):
 
 
 class Table(SpecBase):
-    """The whole table: what is built, what it is made of, what drives it, which rules hold."""
+    """The whole table: its parts, materials, drives and rules."""
 
     gravity: Gravity
     field: Playfield
@@ -241,7 +241,7 @@ class Table(SpecBase):
     surfaces: Surfaces
     ball: Ball
     spare_balls: Annotated[int, Field(ge=0, le=63)] = 0
-    """Balls beside the first that a run can add."""
+    """Further balls that a run can add."""
     rod: Rod
     lines: dict[LineName, Line]
     drive: Drive

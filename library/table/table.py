@@ -69,7 +69,7 @@ class TableKit(Kit):
             for name, pair in surfaces.items()
         }
         sides[BALL] = Side(bounce, grip)
-        sides[DEFAULT] = sides[WALLS]  # of bodies that are no part of a table
+        sides[DEFAULT] = sides[WALLS]  # of bodies outside of a table
         return Physics(table.gravity, surfaces, between, table.solver_iterations, table.contact_erp, sides)
 
     def reach(self, layout: Layout) -> Reach:

@@ -18,7 +18,7 @@ from foosim.world.spec import WorldSpec
 
 
 def table_findings(table: Table, spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what is wrong between the settings of a table, and of its robots."""
+    """Yield the contradictions between the settings of a table, and of its robots."""
     yield from _robots(table, spec)
     yield from _lines(table)
     yield from _neighbours(table)
@@ -75,10 +75,10 @@ def _neighbours(table: Table) -> Iterator[Finding]:
         return
     reach, end = Fraction(hypot(rod.foot.length / 2, rod.foot_radius)), _exact(table.field.length)
     places.sort()
-    told: set[frozenset[Location]] = set()
+    reported: set[frozenset[Location]] = set()
     for (x, name, at), (there, other, beside) in pairwise(places):
-        if there - x < 2 * reach and frozenset((at, beside)) not in told:
-            told.add(frozenset((at, beside)))
+        if there - x < 2 * reach and frozenset((at, beside)) not in reported:
+            reported.add(frozenset((at, beside)))
             apart = f"{_mm(there - x)} apart, and their figures reach {float(reach * 1000):.1f} mm"
             what = f"{name} and {other} would overlap: they are {apart}"
             yield Finding(at, what, other=Finding(beside, what))

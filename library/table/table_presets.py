@@ -1,7 +1,7 @@
-"""Tables of the kit by name: `table: {preset: us}` has all that is not written beside it.
+"""Tables of the kit by name: `table: {preset: us}` has all settings that the deployment leaves out.
 
-Marks beside a value: [S] read in the named source, [M] measured, [D] derived from these, [A] assumption without one.
-What a preset does not say is as in the German one.
+Marks of a value: [S] read in the named source, [M] measured, [D] derived from these, [A] assumption without one.
+A setting without a value in a preset is as in the German one.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ SMALL: Final[Mapping[str, Any]] = {
 
 
 def _over(base: Mapping[str, Any], own: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a preset with what another one says differently."""
+    """Return a preset with the differences of another one."""
     return {
         **base,
         **{

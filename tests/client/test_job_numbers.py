@@ -142,9 +142,9 @@ def test_a_reading_that_the_network_has_changed_is_passed_over(reading: Reading)
 @pytest.mark.parametrize(
     ("about", "error", "text"),
     [
-        (("hand", "plain", "motion"), BadValue, "plain/motion does no jobs"),
+        (("hand", "plain", "motion"), BadValue, "plain/motion has no jobs"),
         (("hand", "silent", "drive"), BadValue, "silent has no sensor of the kind job"),
-        (("foot", "scout", "drive"), UnknownName, r"takes no jobs of it \(there are: a, hand, z\)"),
+        (("foot", "scout", "drive"), UnknownName, r"takes no jobs from it \(there are: a, hand, z\)"),
         (("hand", "scout", "arm"), UnknownName, "scout has no such actuator"),
     ],
 )

@@ -255,5 +255,5 @@ def test_what_cannot_be_known_is_refused() -> None:
             return
 
     run(20, {"hand": Program(script)})
-    assert "NotJoined: a client that has not joined cannot send" in said[0]
+    assert "NotJoined: the client has not joined" in said[0]
     assert said[1].startswith("UnknownName: not subscribed to this channel of scout")

@@ -217,10 +217,10 @@ def test_a_free_running_player_is_another_one_since_another_tick() -> None:
         (Turn({}, [Packet("blue.goal", "position", bytes(16))]), "not one of its robots (there are: camera, red.attack,"
          " red.defence, red.goal, red.midfield), 'blue.goal', nearest is 'red.goal'"),
         (Turn({}, [Packet("", "", b"")]), "channel '': not 1 to 32 characters"),
-        (Turn({}, [Packet("", "beacon", "text")]), "a payload is a str, not bytes"),  # type: ignore[arg-type]
-        (Turn({}, b"x"), "a turn's packets are a bytes, not a sequence of Packet"),  # type: ignore[arg-type]
-        (None, "act gave a value of type NoneType, not a mapping from robots to commands"),
-        ([Command(0.0, 0.0)], "act gave a value of type list, not a mapping from robots to commands"),
+        (Turn({}, [Packet("", "beacon", "text")]), "a payload is a str; expected bytes"),  # type: ignore[arg-type]
+        (Turn({}, b"x"), "packets is a bytes; expected a sequence of Packet"),  # type: ignore[arg-type]
+        (None, "act returned a NoneType; expected a mapping from robots to commands"),
+        ([Command(0.0, 0.0)], "act returned a list; expected a mapping from robots to commands"),
         ({"camera": Command(0.0, 0.0)}, "no robot that takes a Command (there are: blue.attack,"
          " blue.defence, blue.goal, blue.midfield, red.attack, red.defence, red.goal, red.midfield), 'camera' (ACT)"),
     ],

@@ -77,14 +77,14 @@ class MemorySource:
         self.feed.show(moment)
         return moment
 
-    def tell(self, **message: Any) -> None:
+    def publish(self, **message: Any) -> None:
         assert self.feed is not None
-        self.feed.tell(message)
+        self.feed.publish(message)
 
     def want(self, wanted: Wanted) -> None:
         self.wanted.append(wanted)
 
-    async def ask(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
+    async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         self.asked.append((verb, arguments))
         if verb == "push":
             raise Refused("ball cannot be pushed")
@@ -101,7 +101,7 @@ class Heard:
         self.abouts: list[About] = []
         self.scenes: list[Mapping[str, Any]] = []
         self.moments: list[Moment] = []
-        self.told: list[Mapping[str, Any]] = []
+        self.published: list[Mapping[str, Any]] = []
         self._more = asyncio.Event()
 
     def describe(self, about: About, scene: Mapping[str, Any]) -> None:
@@ -114,8 +114,8 @@ class Heard:
         self.moments.append(moment)
         self._more.set()
 
-    def tell(self, message: Mapping[str, Any]) -> None:
-        self.told.append(message)
+    def publish(self, message: Mapping[str, Any]) -> None:
+        self.published.append(message)
         self._more.set()
 
     @property
@@ -124,7 +124,7 @@ class Heard:
         return self.moments[-1].tick if self.moments else -1.0
 
     def of(self, kind: str) -> list[Mapping[str, Any]]:
-        return [message for message in self.told if message["type"] == kind]
+        return [message for message in self.published if message["type"] == kind]
 
     async def until(self, reached: Callable[[], bool]) -> None:
         """Wait for a fact."""

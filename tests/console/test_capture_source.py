@@ -34,7 +34,7 @@ def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_step
             kinds = {mark["kind"] for message in heard.of("marks") for mark in message["marks"]}
             assert {"push", "add", "kickoff"} <= kinds
 
-            answer = await source.ask("seek", {"tick": 237}, "me")
+            answer = await source.request("seek", {"tick": 237}, "me")
             assert (answer.tick, answer.accepted) == (237, True)
             await heard.until(lambda: heard.tick == 237)
             seen = [(moment.tick, moment.jump) for moment in heard.moments[-2:]]
@@ -46,10 +46,10 @@ def test_a_capture_tells_its_scene_marks_links_and_status_and_is_sought_and_step
             assert status["ticks"] == 237 and status["score"] == {"red": 0, "blue": 0} and status["state"] == "paused"
             assert status["nodes"].keys() == {"n1", "n2"} and status["packets"]["offered"] > 100
 
-            await source.ask("step", {"count": 3}, "me")
+            await source.request("step", {"count": 3}, "me")
             await heard.until(lambda: heard.tick == 240)
             assert np.array_equal(heard.moments[-1].poses, exact.poses)
-            assert (await source.ask("step", {"count": -1, "unit": "frames"}, "me")).tick == 230
+            assert (await source.request("step", {"count": -1, "unit": "frames"}, "me")).tick == 230
             await heard.until(lambda: heard.tick == 230 and heard.of("links")[-1]["at"] == 230)
             links = {(link["from"], link["to"]): link for link in heard.of("links")[-1]["links"]}
             assert links["camera", "player-red"]["offered"] > 10 and not links["camera", "player-red"]["radio"]
@@ -73,16 +73,16 @@ def test_it_plays_round_and_refuses_what_it_cannot_do(run: Path) -> None:
         source = FileSource(run)
         source.want(Wanted(1, 200.0))
         async with running(source) as heard:
-            await source.ask("loop", {"on": True}, "me")
-            await source.ask("rate", {"pace": "8x"}, "me")
-            assert (await source.ask("play", {}, "me")).text == "plays at tick 0, 0 s"
+            await source.request("loop", {"on": True}, "me")
+            await source.request("rate", {"pace": "8x"}, "me")
+            assert (await source.request("play", {}, "me")).text == "plays at tick 0, 0 s"
             await heard.until(lambda: sum(moment.jump for moment in heard.moments) > 1)
             ticks = [moment.tick for moment in heard.moments]
             assert source.clock.jumps > 1
             assert all(tick % 10 == 0 or tick == added_tick(run) for tick in ticks)
-            await source.ask("pause", {}, "me")
-            with pytest.raises(Refused, match=r"no request of a recording, 'pase': .* nearest is pause"):
-                await source.ask("pase", {}, "me")
+            await source.request("pause", {}, "me")
+            with pytest.raises(Refused, match=r"a recording has no request 'pase': .* nearest is pause"):
+                await source.request("pase", {}, "me")
             for verb, arguments, said in (
                 ("seek", {"tick": TICKS + 1}, f"has 0 to {TICKS}"),
                 ("seek", {}, "seek needs tick"),
@@ -95,7 +95,7 @@ def test_it_plays_round_and_refuses_what_it_cannot_do(run: Path) -> None:
                 ("branch", {"tick": "1"}, "branch: tick is not a whole number"),
             ):
                 with pytest.raises(BadValue, match=said):
-                    await source.ask(verb, arguments, "me")
+                    await source.request(verb, arguments, "me")
 
     asyncio.run(play())
 
@@ -104,9 +104,9 @@ def test_without_a_machine_that_computes_the_last_capture_holds(run: Path) -> No
     async def look() -> None:
         source = FileSource(run, recompute=lambda frame, inputs: None)
         async with running(source) as heard:
-            await source.ask("seek", {"tick": 237}, "me")
+            await source.request("seek", {"tick": 237}, "me")
             await heard.until(lambda: bool(heard.of("note")))
-            assert "computes another world" in heard.of("note")[0]["text"]
+            assert "results differ from the capture" in heard.of("note")[0]["text"]
             assert heard.moments[-1].tick == 230
             await heard.until(lambda: heard.of("status")[-1]["status"]["shown"] == {"kind": "held", "tick": 230})
 
@@ -115,7 +115,7 @@ def test_without_a_machine_that_computes_the_last_capture_holds(run: Path) -> No
 
 def test_what_a_branch_says_is_what_up_takes(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def ask(tick: int) -> tuple[str, int]:
-        answer = await FileSource(run).ask("branch", {"tick": tick}, "me")
+        answer = await FileSource(run).request("branch", {"tick": tick}, "me")
         return answer.text, answer.tick
 
     monkeypatch.chdir(run.parent)
@@ -144,7 +144,7 @@ def test_a_damaged_file_is_told_and_the_rest_is_shown(run: Path, tmp_path: Path)
         async with running(source) as heard:
             await heard.until(lambda: bool(heard.of("note") and heard.of("marks")))
             assert "damaged.mcap: byte" in heard.of("note")[0]["text"] and heard.of("note")[0]["level"] == "error"
-            await source.ask("seek", {"tick": TICKS}, "me")
+            await source.request("seek", {"tick": TICKS}, "me")
             await heard.until(lambda: heard.tick == TICKS)
 
     asyncio.run(look())
@@ -164,7 +164,7 @@ def test_a_capture_that_grows_moves_the_end_of_the_slider(
             path.write_bytes(whole)
             await heard.until(lambda: source.about.span == (0, TICKS))
             assert heard.abouts[-1].span == (0, TICKS) != first
-            await source.ask("seek", {"tick": TICKS}, "me")
+            await source.request("seek", {"tick": TICKS}, "me")
             await heard.until(lambda: heard.tick == TICKS)
 
     monkeypatch.setattr("foosim.console.recorded.capture_source.REFRESH_S", 0.01)
@@ -184,7 +184,7 @@ def test_two_sources_have_one_clock_and_a_distance(run: Path, tmp_path: Path) ->
         csv = PosesSource(table, one.clock, deployment=one.recording.deployment, compare=one.opened(links=True))
         assert csv.about.kind == "poses" and csv.about.verbs == () and other.about.verbs == ("branch",)
         async with running(one) as ours, running(other) as theirs, running(csv) as real:
-            await one.ask("seek", {"tick": 100}, "me")
+            await one.request("seek", {"tick": 100}, "me")
             await theirs.until(lambda: theirs.tick == 120)
             await ours.until(lambda: ours.tick == 100)
             await real.until(lambda: real.tick == 100)
@@ -199,10 +199,10 @@ def test_two_sources_have_one_clock_and_a_distance(run: Path, tmp_path: Path) ->
             assert {entity["name"] for entity in near["entities"]} == {"ball", "red.goal/slide"}
             assert max(metres for _, metres in near["series"] if metres is not None) < 1e-5
             assert far["series"][100][1] > 1e-3 and [tick for tick, _ in far["series"]] == [*range(TICKS + 1)]
-            with pytest.raises(Refused, match="ask that one"):
-                await csv.ask("play", {}, "me")
-            with pytest.raises(Refused, match="there are branch"):
-                await other.ask("play", {}, "me")
+            with pytest.raises(Refused, match="send the request to that one"):
+                await csv.request("play", {}, "me")
+            with pytest.raises(Refused, match="valid are branch"):
+                await other.request("play", {}, "me")
             assert one.clock.time_ns() == 100 * TICK_NS
 
     asyncio.run(look())
@@ -216,7 +216,7 @@ def test_a_table_alone_is_played_as_well(tmp_path: Path) -> None:
         source = PosesSource(table)
         assert source.about.span == (1000, 2000) and "play" in source.about.verbs
         async with running(source) as heard:
-            await source.ask("seek", {"tick": 1250}, "me")
+            await source.request("seek", {"tick": 1250}, "me")
             await heard.until(lambda: heard.tick == 1250)
             assert heard.moments[-1].poses[0].tolist() == [0.25, 0, 0, 0, 0, 0, 1]
             assert heard.scenes[0]["links"][0]["shapes"][0]["kind"] == "sphere"

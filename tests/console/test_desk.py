@@ -62,7 +62,7 @@ def test_the_console_sends_robots_and_a_new_one_takes_up_the_last_job(tmp_path: 
             "drone/drive: x 0 m, y 1 m, z 2 m, yaw 0 rad"
         )
         assert [job["text"] for job in desk.jobs()] == [
-            "job to x 0 m, y 1 m, z 2 m, yaw 0 rad: not sent: the robot's job sensor has not been heard"
+            "job to x 0 m, y 1 m, z 2 m, yaw 0 rad: not sent: the robot's job sensor has not been received"
         ]
         desk.send("scout", "drive", {"x": 1.0, "y": 0.5})
         told.extend((until(desk, "scout", "done"), until(desk, "drone", "done")))
@@ -115,7 +115,7 @@ def test_the_console_sends_robots_and_a_new_one_takes_up_the_last_job(tmp_path: 
 NUMBER: Final = re.compile("job [0-9]+")
 WRONG: Final = (
     ("mute", {"x": 0.0, "y": 0.0}, "UnknownName",
-     "no actuator whose jobs a sensor reports (there are: drone/drive, scout/drive), 'mute/drive', "
+     "no actuator with a job sensor (there are: drone/drive, scout/drive), 'mute/drive', "
      "nearest is 'scout/drive'"),
     ("scout", {"x": 0.0}, "BadValue", "scout/drive takes x (m), y (m): x given"),
     ("scout", {"x": 0.0, "y": "far"}, "BadValue", "scout/drive takes x (m), y (m): y is not a number, 'far'"),

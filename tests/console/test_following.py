@@ -109,7 +109,7 @@ def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
 
 def test_a_request_names_the_browser_that_asked_and_is_marked_once() -> None:
     found = following()
-    found.asked("operator-1-abc", 5, "pause", "browser 2")
+    found.keep_requester("operator-1-abc", 5, "pause", "browser 2")
     entry = {"tick": 5, "verb": "pause", "text": "paused at tick 5", "who": "operator-1-abc", "accepted": True}
     other = {**entry, "tick": 4, "verb": "rate", "text": "pace 2x from tick 4", "who": "operator-9-xyz"}
     messages = {message["type"]: message for message in found.take_status(status("paused", other, entry))}
@@ -144,7 +144,7 @@ def test_what_this_world_does_not_have_is_not_asked_for() -> None:
 
 def test_a_link_that_is_watched_is_told_with_its_rule_before_it_drops_anything() -> None:
     found = following()
-    report = {"drops": {"camera>player-red": []}, "readings": {}, "asked": [], "here": []}
+    report = {"drops": {"camera>player-red": []}, "readings": {}, "events": [], "here": []}
     watched = status("running") | {"watched": report}
     wanted = Wanted(1, links=(("camera", "player-red"), ("camera", "player-blue")))
     (told,) = found.explained(watched, wanted)

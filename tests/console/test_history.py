@@ -249,9 +249,9 @@ def test_the_last_drops_of_a_link_are_explained_as_the_command_does(history: Cap
         assert drop["verdict"] == expected.verdict and drop["cause"] == lost.cause[number]
         assert [step["text"] for step in drop["steps"]] == [step.text for step in expected.steps]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(history, "_asked", [(50, '{"set": {"link": "everything", "delay": "20 ms"}}')])
+        patch.setattr(history, "_requested", [(50, '{"set": {"link": "everything", "delay": "20 ms"}}')])
         rules = [history.watched("camera", "player-red", tick * TICK_NS)["rule"].splitlines() for tick in (49, 50)]
-    assert "changed: delay 20 ms, since 0.1 s (tick 50), asked for" in rules[1] and "mean 20" not in rules[0][-1]
+    assert "changed: delay 20 ms, since 0.1 s (tick 50), requested" in rules[1] and "mean 20" not in rules[0][-1]
     assert [len(lines) for lines in rules] == [3, 4] and rules[0][-1] != rules[1][-1]
     assert history.watched("nobody", "nobody", 0) == {"link": ["nobody", "nobody"], "rule": "", "drops": []}
 

@@ -104,7 +104,7 @@ def test_what_nobody_looked_at_is_a_gap_and_a_request_goes_to_the_one_who_leads(
         assert live.wanted == [LOOKED_AT, Wanted(2, 50.0)] and leader.gaps == 1
         leader.want(Wanted())
         assert leader.gaps == 2
-        assert (await leader.ask("pause", {}, "me")).text == "pause done"
+        assert (await leader.request("pause", {}, "me")).text == "pause done"
 
     asyncio.run(look())
 

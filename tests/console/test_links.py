@@ -47,9 +47,9 @@ def test_a_rule_says_what_is_in_force_what_was_changed_by_whom_and_what_that_amo
     base, tick = RuleTexts(deployment).text("pilot01", "pilot02"), {at: at * 1_000_000_000 // tick_ns for at in (1, 2)}
     planned = f"changed: delay 50 ms, since 1 s (tick {tick[1]}), by the deployment"
     by_plan = f"{planned} until 4 s"
-    by_hand = f"changed: loss 30 %, since 2 s (tick {tick[2]}), asked for by browser 3 until 4 s"
+    by_hand = f"changed: loss 30 %, since 2 s (tick {tick[2]}), requested by browser 3 until 4 s"
     assert changes(0.5) == changes(4.5) == [] and changes(1.5) == [by_plan]
-    cut = f"cut by a partition: nothing passes, since 2.5 s (tick {asked[1][0]}), asked for until 3.5 s"
+    cut = f"cut by a partition: nothing passes, since 2.5 s (tick {asked[1][0]}), requested until 3.5 s"
     assert changes(2.2) == [by_plan, by_hand] and changes(3.2) == [by_plan, by_hand, cut]
     assert changes(2.2, []) == [planned]
     meaning = texts.text("pilot01", "pilot02", 2_200_000_000, asked, who).splitlines()[-1]

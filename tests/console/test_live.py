@@ -47,8 +47,8 @@ def test_a_run_that_is_not_there_is_looked_for_and_said_once(monkeypatch: pytest
     asyncio.run(scene())
     notes = [note["text"] for note in heard.of("note")]
     assert notes == [
-        "mine is not there: run mine is starting; it is looked for",
-        "mine is not there: run mine is over; it is looked for",
+        "mine is not reached: run mine is starting; reconnecting",
+        "mine is not reached: run mine is over; reconnecting",
     ]
     assert presences(heard) == [("away", note) for note in notes], "it may be started again"
 
@@ -79,7 +79,7 @@ def test_how_a_run_has_ended_is_said_once_also_as_the_last_thing_that_a_console_
         await asyncio.wait((running,))
 
     asyncio.run(scene())
-    assert presences(heard) == [("away", "mine is not there: run mine is over; it is looked for"), ("ended", "done")]
+    assert presences(heard) == [("away", "mine is not reached: run mine is over; reconnecting"), ("ended", "done")]
 
 
 @pytest.mark.parametrize("ends", ["done", "stopped", "lost vhub: it was killed"])
@@ -107,20 +107,20 @@ def test_the_end_of_a_run_names_who_stopped_it_and_what_shows_its_capture(
 
 
 class ResumeState(Control):
-    """A run that is not moved by anybody, without a wire: it remembers what it was asked for."""
+    """An idle run, without a wire: it keeps its requests."""
 
     def __init__(self) -> None:
-        self.asked: list[str] = []
+        self.requested: list[str] = []
 
     def describe(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
         return described(frame_of(5))
 
     def status(self, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool) -> dict[str, Any]:
-        self.asked.append("status")
-        return status("running") | {"ticks": 100 * self.asked.count("status")}
+        self.requested.append("status")
+        return status("running") | {"ticks": 100 * self.requested.count("status")}
 
-    def ask(self, verb: str, timeout_s: float = 0.0, give_up: Callable[[], bool] = bool, **arguments: Any) -> Answer:
-        self.asked.append(verb)
+    def request(self, verb: str, timeout_s: float = 0, give_up: Callable[[], bool] = bool, **arguments: Any) -> Answer:
+        self.requested.append(verb)
         return Answer("operator", "1", True, 5, "", b"")
 
     def view(self, inbox: Inbox) -> None:
@@ -138,13 +138,13 @@ def test_while_nobody_looks_statuses_alone_are_asked_for_and_kept(monkeypatch: p
         source = LiveSource("mine", lambda give_up: control, None)
         running = asyncio.create_task(source.run(Heard()))
         async with asyncio.timeout(30):
-            while control.asked.count("status") < 4:
+            while control.requested.count("status") < 4:
                 await asyncio.sleep(0)
-            assert {*control.asked} == {"status"}, "no frames"
+            assert {*control.requested} == {"status"}, "no frames"
             name, _, points = await source.history(Curve("t", status="ticks"))
             assert name == "ticks" and points[:3] == [(100.0, 100.0), (200.0, 200.0), (300.0, 300.0)]
             source.want(Wanted(1, 50.0))
-            while "watch" not in control.asked:
+            while "watch" not in control.requested:
                 await asyncio.sleep(0)
         running.cancel()
         await asyncio.wait((running,))
@@ -158,7 +158,7 @@ def test_an_argument_that_is_none_of_a_request_is_refused(name: str) -> None:
         raise AssertionError("nobody is asked")
 
     async def scene() -> None:
-        with pytest.raises(BadValue, match="no argument of a request"):
-            await LiveSource("mine", connect, connect).ask("add", {name: 1}, "browser 1")
+        with pytest.raises(BadValue, match="a request has no such argument"):
+            await LiveSource("mine", connect, connect).request("add", {name: 1}, "browser 1")
 
     asyncio.run(scene())

@@ -37,7 +37,7 @@ def test_each_tick_shows_what_was_captured_last_and_says_what_that_is(run: Path,
     added, drawing = added_tick(run), recording.drawing
     for tick in range(TICKS + 1):
         look = recording.look(tick)
-        assert look is not None and look.asked == tick
+        assert look is not None and look.requested == tick
         if tick in frames:
             assert (look.kind, look.tick) == ("frame", tick)
             assert np.array_equal(look.values, drawing.poser.numbers(frames[tick].values), equal_nan=True)

@@ -17,14 +17,14 @@ from tests.console.test_desk import ROBOTS, TEXT
 from tests.kinematic_yard import yard_text
 
 GO = {"robot": "scout", "actuator": "drive", "numbers": {"x": 1.0, "y": 0.0}}
-WHY = "this console cannot send robots, it is not connected: a client desk is already here"
+WHY = "this console cannot send robots, its client is not connected: a client desk is already here"
 
 
 async def refused(sending: Sending) -> None:
     """Have a request refused for what it has, in the thread that connects: what was to be done before is done."""
     await asyncio.sleep(0)
     with pytest.raises(BadValue, match="cancel takes robot, actuator, a mapping of 3"):
-        await sending.ask("cancel", GO)
+        await sending.request("cancel", GO)
 
 
 def test_a_second_console_says_why_it_can_send_nobody_and_tries_again_when_it_is_asked() -> None:
@@ -41,17 +41,17 @@ def test_a_second_console_says_why_it_can_send_nobody_and_tries_again_when_it_is
         await refused(sending)
         assert tried == [], "nobody looks"
         sending.want(2)
-        while not heard.told:
+        while not heard.published:
             await asyncio.sleep(0)
-        assert [*heard.told] == [{"type": "jobs", "problem": WHY, "jobs": []}]
+        assert [*heard.published] == [{"type": "jobs", "problem": WHY, "jobs": []}]
         with pytest.raises(Failed, match=WHY):
-            await sending.ask("send", GO)
+            await sending.request("send", GO)
         assert tried == ["desk"] * 2
         sending.want(1)
         while len(tried) < 3:
             await asyncio.sleep(0)
         await refused(sending)
-        assert len(heard.told) == 1, "it is said once"
+        assert len(heard.published) == 1, "it is said once"
         running.cancel()
         await asyncio.wait((running,))
 
@@ -69,7 +69,7 @@ def test_without_an_endpoint_of_the_console_nothing_connects() -> None:
         sending.want(1)
         await refused(sending)
         await asyncio.sleep(0)
-        assert heard.told == [] and not running.done()
+        assert heard.published == [] and not running.done()
         running.cancel()
         await asyncio.wait((running,))
 

@@ -68,7 +68,7 @@ def test_a_console_that_ends_says_why_and_last_that_its_run_has_ended(has_ended:
                 await browser.hear("scene")
                 if has_ended:
                     text = "The run has ended: done. " + "x" * 200
-                    stage.source.tell(type="presence", state="ended", text=text)
+                    stage.source.publish(type="presence", state="ended", text=text)
             if has_ended:
                 assert (await browser.hear("presence"))["text"] == text
             with pytest.raises(ConnectionClosed) as closed:
@@ -85,18 +85,18 @@ def test_a_console_that_ends_says_why_and_last_that_its_run_has_ended(has_ended:
 def test_what_is_asked_is_answered_to_the_one_who_asked() -> None:
     async def part(stage: Console) -> None:
         async with stage.browser() as operator, stage.browser("look") as viewer:
-            await operator.say(type="ask", id=3, verb="pause", arguments={"deep": [1]})
+            await operator.say(type="request", id=3, verb="pause", arguments={"deep": [1]})
             answer = await operator.hear("answer")
             assert answer == {
                 "type": "answer", "id": 3, "accepted": True, "text": "pause done", "tick": 7, "verb": "pause",
                 "who": "browser 1",
             }  # fmt: skip
-            await operator.say(type="ask", id=4, verb="push")
+            await operator.say(type="request", id=4, verb="push")
             assert (await operator.hear("answer"))["text"] == "ball cannot be pushed"
-            await operator.say(type="ask", id=5, verb="explode")
+            await operator.say(type="request", id=5, verb="explode")
             assert "pause, push" in (await operator.hear("answer"))["text"]
             assert (await viewer.hear("welcome"))["sources"][0]["verbs"] == []
-            await viewer.say(type="ask", id=6, verb="pause")
+            await viewer.say(type="request", id=6, verb="pause")
             assert "only views" in (await viewer.hear("answer"))["text"]
             assert stage.source.asked == [("pause", {"deep": [1]}), ("push", {})]
 
@@ -115,12 +115,12 @@ def test_curves_of_status_links_and_readings_are_told_as_points() -> None:
             await browser.say(type="plot", series=series)
             told = await browser.hear("plotted")
             assert told["series"] == [{"id": "known", "name": "the ball", "unit": "m", "points": [[1.0, 2.0]]}]
-            stage.source.tell(type="status", status={"ticks": 9, "lag_ms": {"p99": 1.5}})
+            stage.source.publish(type="status", status={"ticks": 9, "lag_ms": {"p99": 1.5}})
             assert (await browser.hear("plotted"))["series"][0]["points"] == [[9, 1.5]]
             row = {"from": "a", "to": "b", "offered": 4, "loss": 0.25}
-            stage.source.tell(type="links", at=10, links=[row, {**row, "loss": None, "offered": 0}])
+            stage.source.publish(type="links", at=10, links=[row, {**row, "loss": None, "offered": 0}])
             assert (await browser.hear("plotted"))["series"][0]["points"] == [[10, 0.25]]
-            stage.source.tell(type="readings", robot="camera", channel="ball", points=[[11, [0.5, 0.75]]])
+            stage.source.publish(type="readings", robot="camera", channel="ball", points=[[11, [0.5, 0.75]]])
             assert (await browser.hear("plotted"))["series"][0]["points"] == [[11, 0.75]]
             assert stage.source.wanted[-1].readings == (("camera", "ball"),)
 
@@ -137,7 +137,7 @@ def test_who_looks_at_what_is_told_to_the_source_until_nobody_does() -> None:
                 await one.say(type="show", hz=25)
                 await until(lambda: stage.source.wanted[-1].hz == 25 and bool(stage.source.wanted[-1].links))
                 assert stage.source.wanted[-1].overlays == {"rays"}
-                stage.source.tell(type="watched", link=["a", "b"], drops=[])
+                stage.source.publish(type="watched", link=["a", "b"], drops=[])
                 assert (await other.hear("watched"))["link"] == ["a", "b"]
                 await one.say(type="watch", link=["a", "b"])  # who comes later gets what was told
                 assert (await one.hear("watched"))["drops"] == []
@@ -189,7 +189,7 @@ GARBAGE = [
     ('{"type": "hello", "token": "touch"}', "a second hello"),
     ("{", "not a message of a page"),
     ('{"type": "explode"}', "explode"),
-    ('{"type": "ask", "id": 1, "verb": "pause", "source": 3}', "no source 3"),
+    ('{"type": "request", "id": 1, "verb": "pause", "source": 3}', "no source 3"),
     ('{"type": "show", "hz": 1e9}', "hz"),
     ('{"type": "plot", "series": [{"id": "a", "field": 1000000}]}', "field 1000000"),
     ('{"type": "plot", "series": [{"id": "a", "field": 1, "status": "ticks"}]}', "exactly one"),
@@ -225,7 +225,7 @@ def test_a_browser_that_never_reads_costs_bounded_memory_and_nobody_waits_for_it
             for tick in range(1, 4001):
                 board.readers["browser 1"].follows[0].next_s = 0.0
                 last = stage.source.show(tick)
-                stage.source.tell(type="status", status={"ticks": tick, "text": "x" * 2000})
+                stage.source.publish(type="status", status={"ticks": tick, "text": "x" * 2000})
                 if tick % 20 == 0:
                     await asyncio.sleep(0)
             head = (await good.moment())[0]
@@ -234,7 +234,7 @@ def test_a_browser_that_never_reads_costs_bounded_memory_and_nobody_waits_for_it
             waiting = board.readers["browser 2"]
             assert len(waiting._newest) <= 2
             for _ in range(1000):  # what nothing replaces: it is cut off
-                stage.source.tell(type="note", level="info", text="x" * 20_000)
+                stage.source.publish(type="note", level="info", text="x" * 20_000)
                 await good.hear("note")
             assert "browser 2" not in board.readers
             assert "browser 1" in board.readers

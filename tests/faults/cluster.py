@@ -218,7 +218,7 @@ class Cluster:
         """End the run in order, check it (`compare`), and return its result."""
         for process in (SUPERVISOR, *self.proxies):
             self.keep_down(process)
-        self.control.ask("down")
+        self.control.request("down")
         if not self._launcher.wait(LIMIT_S):
             raise FaultError(f"{', '.join(child.name for child in self._launcher.alive())} did not end with the run")
         result = self.run_folder.result()

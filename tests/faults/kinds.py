@@ -160,9 +160,9 @@ def node_stopped(trial: Trial) -> Figures:
     trial.calm()
     known = len(cluster.recoveries("join", node))
     cluster.keep_down(node)
-    cluster.control.ask("stop", node=node)
+    cluster.control.request("stop", node=node)
     cluster.wait(f"the end of {node}", lambda: not cluster.is_alive(node))
-    cluster.control.ask("start", node=node)
+    cluster.control.request("start", node=node)
     cluster.start(node)
     return {"outage": float(cluster.next_recovery("join", node, known)["outage_ms"])}
 
@@ -175,7 +175,7 @@ def robot_moved(trial: Trial) -> Figures:
     away = dice.choice([node for node in cluster.nodes if node != home])
     trial.calm()
     for node in (away, home):
-        cluster.control.ask("move", robot=robot, node=node)
+        cluster.control.request("move", robot=robot, node=node)
         cluster.advance()
         if robot not in cluster.status()["nodes"][node]["owned"]:
             raise FaultError(f"{robot} was moved to {node}, which does not own it")
@@ -252,7 +252,7 @@ def add_bodies(cluster: Cluster) -> None:
     """Fill the table: rows of balls between the rods, that fall on it."""
     for number in range(ADDED):
         x, y = -0.45 + 0.15 * (number % 7), -0.25 + 0.1 * (number // 7)
-        cluster.control.ask("add", name="ball", at=f"{x:g},{y:g},0.1")
+        cluster.control.request("add", name="ball", at=f"{x:g},{y:g},0.1")
 
 
 class Lost:

@@ -44,11 +44,11 @@ def client_floods(trial: Trial) -> Figures:
     with entered(cluster) as client:
         calm_ms = lag_ms(cluster, client, 0)
         more_ms = lag_ms(cluster, client, AT_ONCE) - calm_ms
-        cluster.control.ask("pause")
+        cluster.control.request("pause")
         cluster.wait("the pause", lambda: (now := cluster.status())["ticks"] == now["released"])
         for number in range(TOO_MANY):
             client.send((ROBOT, "player-red")[number % 2], CHANNEL_ECHO, BIG)
-        cluster.control.ask("resume")
+        cluster.control.request("resume")
         before = known["refusals"].get("inbox_full", 0)
         cluster.wait("what is refused", lambda: heard(cluster, client)["refusals"].get("inbox_full", 0) > before)
     unharmed(cluster, known)
@@ -78,12 +78,12 @@ def robot_explodes(trial: Trial) -> Figures:
                 client.send(ROBOT, "position", payload)
         cluster.advance(5)
     with suppress(RequestRefused):
-        cluster.control.ask("push", impulse=[1e300, 0.0, 0.0])
+        cluster.control.request("push", impulse=[1e300, 0.0, 0.0])
         raise FaultError("a push of 1e300 N s is accepted")
-    cluster.control.ask("pause")
+    cluster.control.request("pause")
     for _ in range(2):
-        cluster.control.ask("push", impulse=[IMPULSE, 0.0, 0.0])
-    cluster.control.ask("resume")
+        cluster.control.request("push", impulse=[IMPULSE, 0.0, 0.0])
+    cluster.control.request("resume")
     cluster.advance()
     stands = cluster.status()["ball"]["position"]
     cluster.wait("the kick-off", lambda: cluster.status()["ball"]["position"] != stands)

@@ -190,7 +190,7 @@ def test_a_ball_at_rest_tells_nothing(typed: Typed, tmp_path: Path) -> None:
     track = np.column_stack([np.arange(0.0, 0.5, 0.01), np.full(50, 0.1), np.full(50, 0.2)])
     done = run(typed, write(tmp_path / "tracks.csv", [track]), "--table", TABLE)
     assert done.code == 1 and yaml.safe_load(done.out) == {}
-    assert "the tracks do not tell floor.friction (0.3 +- inf): it is left out" in done.err
+    assert "the tracks do not determine floor.friction (0.3 +- inf): it is left out" in done.err
 
 
 def test_without_a_rebound_nothing_is_said_of_walls(typed: Typed, tmp_path: Path) -> None:
@@ -205,19 +205,19 @@ def test_without_a_rebound_nothing_is_said_of_walls(typed: Typed, tmp_path: Path
     file = write(tmp_path / "tracks.csv", tracks)
     done = run(typed, file, "--table", TABLE, "--out", out)
     assert done.code == 0 and done.out == ""
-    assert "no track comes back from a wall: walls.restitution and walls.friction are not fitted" in done.err
+    assert "no track has a rebound from a wall: walls.restitution and walls.friction are not fitted" in done.err
     (floor,) = yaml.safe_load(out.read_text())["table"]["surfaces"].items()
     assert floor[0] == "floor" and floor[1]["friction"] == pytest.approx(0.3, rel=0.05)
     again = run(typed, file, "--table", TABLE, "--out", out)
-    assert again.code == 2 and again.err == f"--out {out}: it exists, and is never overwritten\n"
+    assert again.code == 2 and again.err == f"--out {out}: the file exists, and is never overwritten\n"
     beside = run(typed, file, "--table", TABLE, "--out", tmp_path / "none" / "fitted.yaml")
-    assert beside.code == 2 and beside.err.endswith(f": there is no folder {tmp_path / 'none'}\n")
+    assert beside.code == 2 and beside.err.endswith(f": no folder {tmp_path / 'none'}\n")
 
 
 def test_scipy_is_asked_for(monkeypatch: pytest.MonkeyPatch, noisy: tuple[Table, list[Array]]) -> None:
     table, tracks = noisy
     monkeypatch.setitem(sys.modules, "scipy.optimize", None)
-    with pytest.raises(Failed, match=r"needs scipy, which is not installed: pip install 'foosim\[fit\]'"):
+    with pytest.raises(Failed, match=r"needs scipy: pip install 'foosim\[fit\]'"):
         fit(tracks, field_of(table), pairs_of(table))
 
 

@@ -125,7 +125,7 @@ def test_half_an_event_waits_for_its_rest(pad: Pad) -> None:
 def test_a_gamepad_that_is_not_there_is_refused_and_one_that_leaves_may_come_back(
     tmp_path: Path, pad: Pad, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(BadValue, match=r"there is no such gamepad \(there are: .*\), '/"):
+    with pytest.raises(BadValue, match=r"unknown gamepad \(there are: .*\), '/"):
         Gamepad(DEPLOYMENT, {"team": "red", "device": str(tmp_path / "js8")})
     with pytest.raises(BadValue, match="parameter device is not the path of a device, 7"):
         Gamepad(DEPLOYMENT, {"team": "red", "device": 7})
@@ -206,7 +206,7 @@ def test_without_a_terminal_the_message_says_how_to_get_one(monkeypatch: pytest.
     inner, outer = pty.openpty()
     with open(outer, encoding="utf-8") as background:
         monkeypatch.setattr(sys, "stdin", background)
-        with pytest.raises(BadValue, match="this process is in the background of it"):
+        with pytest.raises(BadValue, match="this process is in the background"):
             Keyboard(DEPLOYMENT, {"team": "red"})
     os.close(inner)
     with pytest.raises(BadValue, match="parameter team is not one of red, blue, 'green'"):

@@ -52,7 +52,7 @@ def test_a_rod_is_where_its_player_foresees_it(name: str) -> None:
                 found = foreseen.at(tick + LATE)
                 expected[tick + LATE] = found[0].at, found[1].at
                 command = Command(random.uniform(-most, most), random.uniform(-1.5, 1.5))
-                foreseen.tell(tick + LATE, command.slide, command.spin)
+                foreseen.note(tick + LATE, command.slide, command.spin)
                 coming[tick + LATE] = command
             simulation.step({name: coming.pop(tick)} if tick in coming else {})
     compared = [(expected[tick], places[tick]) for tick in expected if tick in places]
@@ -78,7 +78,7 @@ def test_how_long_a_swing_takes() -> None:
     """As many ticks as its motor needs step by step, and never more than what is asked for."""
     (rod,) = rods_of(DEPLOYMENT, "red", ["midfield"])
     rod.see(RodPosition(0.0, 0.7), 0)
-    rod.tell(rod.command(0.0, 1.25), 0)
+    rod.note(rod.command(0.0, 1.25), 0)
     tick_s, tick = DEPLOYMENT.tick_ns * 1e-9, 0
     while rod.swing < 0.0:
         tick += 1

@@ -297,7 +297,7 @@ def test_what_an_eye_cannot_see_fails_its_job(its: Simulation) -> None:
 @pytest.mark.parametrize(
     ("kind", "about", "why"),
     [
-        ("pan_tilt", {"joints": ["skull", "neck"]}, "the second one hangs on the first: pan, then tilt"),
+        ("pan_tilt", {"joints": ["skull", "neck"]}, "the second joint must be on the first: pan, then tilt"),
         ("pan_tilt", {"joints": ["neck"]}, "two joints that turn are valid, pan and tilt"),
         ("look_at", {"at": {"link": "neck"}}, "its joints do not turn this link"),
         ("look_at", {"at": {"link": "ear"}}, "head has no such link; there are foot, neck, skull, eye"),

@@ -120,7 +120,7 @@ def test_a_current_is_the_effort_over_the_motors_constants(driven: Callable[...,
 
 
 def test_a_current_without_constants_is_refused() -> None:
-    with pytest.raises(DeploymentError, match=r"red\.goal\.sensors\.current\.kind: nothing says how much a current"):
+    with pytest.raises(DeploymentError, match=r"red\.goal\.sensors\.current\.kind: the force of a current is unknown"):
         apply_sets(TEXT, TABLE.name, ["robots.red.goal.sensors.current={kind: motor_current, rate: 100 Hz}"])
 
 

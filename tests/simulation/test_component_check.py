@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.library.mobile.asked import MotionsAsked
+from foosim.library.mobile.set_points import MotionSetPoints
 from foosim.simulation.check.component_check import ComponentCheck, used_form
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
@@ -195,9 +195,9 @@ class Together:
 
 def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three robots, which a run asks one after the other."""
-    right = MotionsAsked.command
+    right = MotionSetPoints.command
 
-    def wrong(self: MotionsAsked, view: View) -> NDArray[Any]:
+    def wrong(self: MotionSetPoints, view: View) -> NDArray[Any]:
         asked = right(self, view)
         asked[-1, 0, 0] += 1e-9 * len(asked)
         return asked
@@ -205,10 +205,10 @@ def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monke
     robots = {f"r{n}": {"model": "differential_drive", "at": {"x": f"{n} m"}} for n in range(3)}
     text = yard_text(robots)
     assert list(broken_laws(text, "yard.yaml", 3)) == []
-    monkeypatch.setattr(MotionsAsked, "command", wrong)
+    monkeypatch.setattr(MotionSetPoints, "command", wrong)
     (found,) = broken_laws(text, "yard.yaml", 3)
     assert found == "actuator motion of r0 asks for something else alone than with others, at tick 1"
-    monkeypatch.setattr(MotionsAsked, "command", lambda self, view: right(self, view)[1:])
+    monkeypatch.setattr(MotionSetPoints, "command", lambda self, view: right(self, view)[1:])
     (found,) = broken_laws(text, "yard.yaml", 3)
     assert "actuators motion of r0, motion of r1, motion of r2" in found and "of the shape (3, motors, 2)" in found
 

@@ -156,7 +156,7 @@ def test_it_is_controlled_while_it_runs(run: Path) -> None:
         for wrong, text in (({"verb": "seek", "time_ns": -1}, "not a time"), ({"verb": "x"}, "no request of a replay")):
             with playing(run, paused=True) as other, hear_replay(other.address, ()) as asking:
                 with pytest.raises(ReplayRefused, match=text):
-                    asking.ask(**wrong)
+                    asking.request(**wrong)
                 assert asking.stop()["state"] == "paused"
                 assert other.result().reason == "stopped"
 

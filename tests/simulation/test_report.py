@@ -105,7 +105,7 @@ def test_spans_and_events_of_network_and_world(found: Report, radio_run: Path) -
     assert [rule["is_changed"] for rule in found["measured"] if rule["rule"] == "fast"] == [True]
     events = [(event["text"].split(" from ")[0], event["by"]) for event in found["events"]]
     assert ("partition player-red | rest, for 60 ms", "deployment") in events
-    assert [text for text, by in events if by == "asked for"] == [
+    assert [text for text, by in events if by == "requested"] == [
         "push ball by 0.02, 0, -0.01 N s",
         "move red.goal",
         "clog",

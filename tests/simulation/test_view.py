@@ -60,14 +60,14 @@ def test_a_replay_on_its_plane_is_seen_and_controlled(run: Path) -> None:
         assert source.about.kind == "replay" and source.about.span == (0, TICKS)
         source.want(Wanted(1, 50.0))
         async with running(source) as heard:
-            answer = await source.ask("seek", {"tick": 50}, "me")
+            answer = await source.request("seek", {"tick": 50}, "me")
             assert answer.tick == 50 and answer.text == "paused at tick 50, realtime"
-            await source.ask("step", {"count": 10}, "me")
+            await source.request("step", {"count": 10}, "me")
             await heard.until(lambda: heard.tick == 60)
             spare = [link["name"] for link in heard.scenes[0]["links"]].index("ball-2")
             assert np.isnan(heard.moments[-1].poses[spare]).all()
-            await source.ask("seek", {"tick": 200}, "me")
-            await source.ask("step", {"count": 10}, "me")
+            await source.request("seek", {"tick": 200}, "me")
+            await source.request("step", {"count": 10}, "me")
             await heard.until(lambda: heard.tick == 210)
             assert len(heard.scenes) == 1 and np.isfinite(heard.moments[-1].poses).all(), "the ball was added"
             assert any(moment.jump for moment in heard.moments) and heard.moments[-1].paused
@@ -75,9 +75,9 @@ def test_a_replay_on_its_plane_is_seen_and_controlled(run: Path) -> None:
             await heard.until(lambda: heard.of("status")[-1]["status"]["ticks"] == 210)
             assert heard.of("status")[-1]["status"]["state"] == "paused"
             with pytest.raises(Refused, match="not a time that is played, 0 s to 600 ms"):
-                await source.ask("seek", {"tick": TICKS + 1}, "me")
-            with pytest.raises(Refused, match="no request of a recording"):
-                await source.ask("loop", {"on": True}, "me")
+                await source.request("seek", {"tick": TICKS + 1}, "me")
+            with pytest.raises(Refused, match="a recording has no request"):
+                await source.request("loop", {"on": True}, "me")
 
     with playing(run, paused=True) as played:
         asyncio.run(look(played.address))
@@ -95,8 +95,8 @@ def test_a_recording_follows_a_replay_on_its_plane(
         for source in (one, other):
             source.want(Wanted(1, 50.0))
         async with running(one) as played, running(other) as real:
-            await one.ask("seek", {"tick": 40}, "me")
-            await one.ask("step", {"count": 10}, "me")
+            await one.request("seek", {"tick": 40}, "me")
+            await one.request("step", {"count": 10}, "me")
             await played.until(lambda: played.tick == 50)
             await real.until(lambda: real.tick == 50 and real.moments[-1].paused)
             await real.until(lambda: bool(real.of("compared")) and real.of("compared")[-1]["at"] == 50)
@@ -104,8 +104,8 @@ def test_a_recording_follows_a_replay_on_its_plane(
             assert told["covers"] == (-20, TICKS - 20) and told["entities"][0]["distance_m"] > 1e-4
             names = [link["name"] for link in real.scenes[0]["links"]]
             assert {entity["name"] for entity in told["entities"]} <= {*names}
-            with pytest.raises(Refused, match="ask that one"):
-                await other.ask("play", {}, "me")
+            with pytest.raises(Refused, match="send the request to that one"):
+                await other.request("play", {}, "me")
 
     with playing(run, paused=True) as play:
         strangers = tmp_path / "strangers.csv"
@@ -121,22 +121,22 @@ def test_a_replay_that_ends_is_told(run: Path) -> None:
         connection = hear_replay(address, streams)
 
         def ask(verb: str, **arguments: Any) -> dict[str, Any]:
-            status = Replay.ask(connection, verb, **arguments)
+            status = Replay.request(connection, verb, **arguments)
             while verb == "resume" and not connection.ended:
                 connection._read(None)
             return status
 
-        connection.ask = ask  # type: ignore[method-assign, assignment]
+        connection.request = ask  # type: ignore[method-assign, assignment]
         return connection
 
     async def look(address: str) -> Heard:
         source = PlayedSource(lambda streams: connect_to(address, streams))
         async with running(source) as heard:
-            await source.ask("rate", {"pace": "fast"}, "me")
-            await source.ask("play", {}, "me")
+            await source.request("rate", {"pace": "fast"}, "me")
+            await source.request("play", {}, "me")
             await heard.until(lambda: bool(heard.of("note")))
             with pytest.raises(Refused, match="has ended"):
-                await source.ask("pause", {}, "me")
+                await source.request("pause", {}, "me")
             return heard
 
     with playing(run, paused=True) as played:

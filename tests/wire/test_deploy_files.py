@@ -77,7 +77,7 @@ def test_the_processes_run_with_the_arguments_of_their_file(house: House) -> Non
         code, out, err = house.run(*words_of(probe, probe.probe))
         assert code == 0 and out.startswith("alive, "), err
     with Control(f"tcp/127.0.0.1:{port}") as control:
-        control.ask("down")
+        control.request("down")
     for name, process in started.items():
         code, _, err = house.end(process)
         assert code == 0, f"{name}: {err}"

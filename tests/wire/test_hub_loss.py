@@ -109,7 +109,7 @@ def test_a_vhub_is_killed_twice_and_everything_is_as_if_it_was_not(
             house.wait_for("more words", partial(talk.heard, len(talk.words) + 5))
         house.wait_for("the last word", partial(talk.heard, len(talk.words) + mouth.statistics().sent - talk.words[-1]))
         assert ear.statistics().returns == mouth.statistics().returns == 2
-        control.ask("down")
+        control.request("down")
         talk.until_the_end()
         assert ear.statistics().missing == 0
     code, out, err = house.end(up)

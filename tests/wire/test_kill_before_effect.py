@@ -68,7 +68,7 @@ def test_what_was_answered_takes_effect_at_its_tick_whoever_is_killed_before(hou
                 continue
             number = len(jobs) + 1
             for verb, arguments, field, values in requests(number):
-                answer = control.ask(verb, LIMIT_S, **arguments)
+                answer = control.request(verb, LIMIT_S, **arguments)
                 assert answer.tick >= tick, "the run waits"
                 effects.append((answer.tick, arguments["name"], field, values))
             jobs.append(client.robots["base"].actuators["go"].call(x=float(number), y=1.0))

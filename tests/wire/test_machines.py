@@ -37,7 +37,7 @@ from foosim.client.control import Control
 with Control(sys.argv[1]) as control:
     for line in sys.stdin:
         verb = line.strip()
-        print(encode_json(control.status() if verb == "status" else control.ask(verb).text).decode(), flush=True)
+        print(encode_json(control.status() if verb == "status" else control.request(verb).text).decode(), flush=True)
 """
 """An operator on the supervisor's machine: says a verb, gets the answer."""
 

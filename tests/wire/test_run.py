@@ -90,7 +90,7 @@ def assert_a_viewer_sees_and_cannot_touch() -> None:
     with control.connect(role="viewer") as viewer:
         described = viewer.describe()
         viewer.view(inbox)
-        assert viewer.ask("watch", hz=50).accepted
+        assert viewer.request("watch", hz=50).accepted
         deployment = load_deployment(described["deployment"], described["deployment_name"])
         assert viewer.files(deployment) == {}, "this world has none"
         key, _, payload = inbox.take(LIMIT_S)[0]
@@ -98,7 +98,7 @@ def assert_a_viewer_sees_and_cannot_touch() -> None:
         frame = frame_from_bytes(shown.tick, build_layout(deployment), shown.values, shown.outboxes)
         assert key == channels.VIEW.key and frame.digest == shown.digest
         with pytest.raises(RequestRefused, match="'down' is for operators: a viewer may request status, "):
-            viewer.ask("down")
+            viewer.request("down")
 
 
 def assert_a_node_of_another_world_is_refused(house: House, address: str) -> None:
@@ -249,11 +249,11 @@ def test_what_a_person_asks_takes_effect_at_the_tick_that_the_answer_names(
     with control.connect() as asked:
         assert_paused_at(house, asked, tick)
         assert_it_sleeps(house)
-        assert asked.ask("step", count=10).tick == tick
+        assert asked.request("step", count=10).tick == tick
         assert_paused_at(house, asked, tick + 10)
         assert_the_world_changes_as_asked(house, asked, tick + 10)
-        assert asked.ask("rate", pace="fast").accepted
-        resumed = asked.ask("resume")
+        assert asked.request("rate", pace="fast").accepted
+        resumed = asked.request("resume")
         assert resumed.text == f"resumed at tick {resumed.tick}"
         house.wait_for("ticks", lambda: asked.status()["ticks"] > resumed.tick)
         assert asked.status()["pace"] == "fast"
@@ -337,21 +337,21 @@ def assert_paused_at(house: House, asked: Control, tick: int) -> None:
 def assert_the_world_changes_as_asked(house: House, asked: Control, tick: int) -> None:
     """Push, add, move and remove, each at the first tick that is not yet released."""
     at_rest = asked.status()["ball"]["position"]
-    assert asked.ask("push", impulse=(0.02, 0.01, 0.0)).tick == tick
-    assert asked.ask("add", name="ball", at="0.15,0.1").text == f"ball-2 added at tick {tick}"
-    moved = asked.ask("move", robot="red.goal", node="blue")
+    assert asked.request("push", impulse=(0.02, 0.01, 0.0)).tick == tick
+    assert asked.request("add", name="ball", at="0.15,0.1").text == f"ball-2 added at tick {tick}"
+    moved = asked.request("move", robot="red.goal", node="blue")
     assert moved.text == f"red.goal moved to blue at tick {tick}"
-    asked.ask("step", count=30)
+    asked.request("step", count=30)
     assert_paused_at(house, asked, tick + 30)
     assert asked.status()["ball"]["position"] != at_rest
     assert "red.goal" in asked.status()["nodes"]["blue"]["owned"]
     with pytest.raises(RequestRefused, match="ball is always in the world"):
-        asked.ask("remove", name="ball")
-    assert asked.ask("remove", name="ball-2").tick == tick + 30
-    asked.ask("step", count=5)
+        asked.request("remove", name="ball")
+    assert asked.request("remove", name="ball-2").tick == tick + 30
+    asked.request("step", count=5)
     assert_paused_at(house, asked, tick + 35)
     with pytest.raises(RequestRefused, match="no free body 'ball-2'; there are ball"):
-        asked.ask("push", impulse=(0.0, 0.0, 0.0), name="ball-2")
+        asked.request("push", impulse=(0.0, 0.0, 0.0), name="ball-2")
 
 
 def altered_node(house: House, change: str, name: str, address: str) -> tuple[int, str]:

@@ -85,7 +85,7 @@ def test_a_run_survives_kills_and_one_that_hangs_and_is_the_run_without(house: H
         house.wait_for("red to come back again", lambda: went_on(desk, "node red", "join red", times=2))
         assert_it_is_stopped_and_started_from_another_terminal(house, desk)
         house.ticking(desk.status()["ticks"] + 20)
-        last = desk.ask("down").tick
+        last = desk.request("down").tick
     code, output, error = house.end(up)
     assert code == 0, error
     content = last_json(output)

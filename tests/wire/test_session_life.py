@@ -295,8 +295,8 @@ def test_a_second_control_of_a_process_comes_and_goes_beside_the_first(router: S
         with Control(router.locator) as first:
             for turn in range(5):
                 with Control(router.locator) as second:
-                    assert second.ask("pause", LONG_S).text == "pause"
-                    assert first.ask("resume", LONG_S).text == "resume", turn
+                    assert second.request("pause", LONG_S).text == "pause"
+                    assert first.request("resume", LONG_S).text == "resume", turn
                 assert first.status(LONG_S) == {}
     finally:
         ended.set()

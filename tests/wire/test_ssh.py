@@ -252,7 +252,7 @@ def test_a_node_that_systemd_runs_takes_part(there: There, house: House) -> None
         assert control.status()["processes"]["blue"]["host"] == "there"
         wait_for("two rounds of the watchdog", lambda: told().count("WATCHDOG=1") >= 2)
         assert told()[0] == "READY=1"
-        control.ask("down")
+        control.request("down")
     wait_for("the unit's end", lambda: told()[-1] == "ended 0")
     assert told()[-3:-1] == ["STOPPING=1", "WATCHDOG_USEC=300000000"]
     assert house.end(run)[0] == 0

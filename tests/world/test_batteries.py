@@ -176,15 +176,15 @@ def test_the_sensor_gives_share_and_voltage() -> None:
 @pytest.mark.parametrize(
     ("rules", "sensors", "said"),
     [
-        ({"cell": {"kind": "battery"}}, {}, "robots.cart.rules.cell.kind: a battery without a capacity, such as "),
+        ({"cell": {"kind": "battery"}}, {}, "robots.cart.rules.cell.kind: a battery needs a capacity, for example "),
         (battery(empty="13 V"), {}, "robots.cart.rules.cell: the empty battery's voltage is not below the full one's"),
-        ({**battery(), "more": CELL}, {}, "robots.cart.rules.more.kind: a second battery of a robot: it has cell"),
+        ({**battery(), "more": CELL}, {}, "robots.cart.rules.more.kind: a second battery: the first is cell"),
         ({}, {"own": {"kind": "battery", "rate": "1 Hz"}},
          "robots.cart.sensors.own.kind: on a robot without a battery: cart has no rule battery"),
         (battery(chargers=[{"radius": "1 m", "power": "1 W"}]), {},
-         "robots.cart.rules.cell.chargers[0]: a charger is about x and y, or about a tag"),
+         "robots.cart.rules.cell.chargers[0]: a charger has x and y, or a tag"),
         (battery(chargers=[{**CIRCLE, "tag": "dock"}]), {},
-         "robots.cart.rules.cell.chargers[0]: a charger is about x and y, or about a tag"),
+         "robots.cart.rules.cell.chargers[0]: a charger has x and y, or a tag"),
     ],
 )  # fmt: skip
 def test_a_battery_that_cannot_be_is_refused(rules: dict[str, Any], sensors: dict[str, Any], said: str) -> None:

@@ -237,7 +237,7 @@ def test_it_stops_at_rigid_bodies_and_leaves_one_that_was_pushed_into_it() -> No
         ),
         (
             {"r": {"model": "mover", "shape": "sphere", "radius": "1 m", "path": [{}, {"x": "1 m", "time": "1 s"}]}},
-            "robots.r.path: all points of a path have a time or none has: point 2 differs",
+            "robots.r.path: point 2 differs: give all points of a path a time, or none",
         ),
     ],
 )

@@ -279,7 +279,7 @@ def test_an_array_that_is_none_of_all_drives_names_them() -> None:
     )
     moving = yard.stepper.world._moving_of(yard.layout.robots)
     ((_, _, together),) = moving.groups
-    together._asked = together._asked[1:]
+    together._at_rest = together._at_rest[1:]
     yard.stepper.world._moving = moving
     with pytest.raises(ComponentError, match="actuators of the motion WheeledMotion failed at tick 0"):
         yard.step()

@@ -10,7 +10,7 @@ from foosim.world.forms.settings import SensorSettings
 
 
 class JobSettings(SensorSettings):
-    """Tells how the jobs of the `actuator` of its robot stand: at its rate, and besides when that changes."""
+    """Reports the states of the jobs of the `actuator` of its robot: at its rate, and at each change."""
 
     actuator: Name
 
@@ -18,9 +18,9 @@ class JobSettings(SensorSettings):
 class Jobs(Struct, frozen=True):
     """The jobs of an actuator. Senders are the players and clients that may command the robot, in name order.
 
-    `running` is the one whose job runs, counted from 1, 0 for none. `failure` says why the actuator could not do what
-    it was told last, by the numbers of its kind; 0: it could, or does not say. Of each sender there are the number of
-    its last job, 0 before the first one, and its state: 1 running, 2 done, 3 failed, 4 preempted, 5 cancelled.
+    `running` is the one whose job runs, counted from 1, 0 for none. `failure` is the reason of a failed last
+    command, by the numbers of the actuator; 0 for none. Of each sender there are the number of its last job, 0 before
+    the first one, and its state: 1 running, 2 done, 3 failed, 4 preempted, 5 cancelled.
     """
 
     running: Count

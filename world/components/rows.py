@@ -5,7 +5,7 @@ from __future__ import annotations
 from copy import copy
 from typing import TYPE_CHECKING, Self
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
     import numpy as np
     from numpy.typing import NDArray
 

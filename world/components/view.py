@@ -20,7 +20,7 @@ from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.spec import WorldSpec
 
-if TYPE_CHECKING:  # numpy is for those who compute a tick
+if TYPE_CHECKING:  # only processes that compute ticks need numpy
     import numpy as np
     from numpy.typing import NDArray
 

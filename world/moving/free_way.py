@@ -1,12 +1,12 @@
 """How far upright bodies may go: none enters scenery, a rigid body or another body that moves by kinematics.
 
-A body that moves by kinematics is a vertical cylinder (`moving.upright`), an obstacle is what overlaps its band of
-heights, seen from above (`solids`). A way that is blocked is gone in halves. Others that move so are where they were at
+A body that moves by kinematics is a vertical cylinder (`moving.upright`), an obstacle is a shape in its band of
+heights, seen from above (`solids`). A blocked way is halved. Others that move so are where they were at
 the tick's start, and each stays on its own side of the plane half-way between two (a buffered Voronoi cell: Zhou, Wang,
 Bandyopadhyay, Schwager, IEEE RA-L 2(2), 2017): an upright plane, or a level one where two are one above the other. So
-they never overlap, and the next state of each is a function of the frame alone, whoever computes which.
+they never overlap, and the next state of each is a function of the frame alone, on any node.
 
-Whoever is in something already, since a rigid body was pushed there, may go where it is in it less.
+An overlapping body, into which a rigid body was pushed, may only move so that the overlap shrinks.
 """
 
 from __future__ import annotations
@@ -39,18 +39,17 @@ from foosim.world.scene import Body, Shape, place, swept_box
 
 Flags: TypeAlias = NDArray[np.bool_]
 HALVINGS: Final = 7
-"""A way that is blocked is tried at 1, 1/2, 1/4, ... of its length, so often."""
+"""The shares of a blocked way that are tried: 1, 1/2, 1/4, ... of its length."""
 SKIN_M: Final = 0.25
-"""Who may meet whom is looked up anew when somebody is this far from where he was then, in x or y."""
+"""The pairs that may meet are looked up anew when a body has moved this far since, in x or y."""
 GAP_M: Final = 1e-6
-"""Half of what stays between two that move: far above rounding."""
+"""Half of the gap between two movers: far above rounding."""
 ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
 
 
 class _Rigid(NamedTuple):
-    """A body that an engine moves, or nobody, or a leaf: its place is that of the frame, or fixed; its parts are in a
-    radius."""
+    """A rigid body, a fixed one or a leaf: its place is that of the frame, or fixed; its parts are within a radius."""
 
     entity: Entity
     body: Body
@@ -59,7 +58,7 @@ class _Rigid(NamedTuple):
 
 
 class FreeWay:
-    """The obstacles of one layout, and everybody in it that moves by kinematics."""
+    """The obstacles of one layout, and all its bodies that move by kinematics."""
 
     def __init__(self, at: MotionMounting) -> None:
         self._tick_s = at.spec.tick_ns / 1e9
@@ -91,26 +90,26 @@ class FreeWay:
         self._rigid_radius = np.array([one.radius for one in self._rigid])
 
     def movers(self, entities: Sequence[Entity], *, is_level: bool = False) -> Movers:
-        """Return what these that move are to obstacles, for `near`; those that are `is_level` keep their height."""
+        """Return the cylinders and ways of these bodies, for `near`; with `is_level` they keep their height."""
         rows = np.array([self._rows[entity.index] for entity in entities])
         way, radius = self._way[rows], self._radius[rows]
-        assert (way > 0.0).all(), "the body of what moves says how fast it can be"
+        assert (way > 0.0).all(), "a moving body has a greatest speed"
         return Movers(rows, radius, self._low[rows], self._high[rows], way, np.ceil(way / radius), is_level)
 
     def near(self, movers: Movers, view: WritableView) -> Near:
-        """Return what these may meet within the tick."""
-        everybody = view.values[self._places]
+        """Return the obstacles and planes that these may meet within the tick."""
+        bodies = view.values[self._places]
         candidates = movers.candidates
-        if candidates is None or not candidates.hold(everybody, movers):
-            candidates = movers.candidates = self._candidates(movers, everybody)
-        places = everybody[movers.rows]
-        planes = self._planes(movers, everybody, candidates)
+        if candidates is None or not candidates.hold(bodies, movers):
+            candidates = movers.candidates = self._candidates(movers, bodies)
+        places = bodies[movers.rows]
+        planes = self._planes(movers, bodies, candidates)
         return Near(places, movers, planes, self._solids(movers, places, candidates, view.numbers))
 
-    def _candidates(self, movers: Movers, everybody: Floats) -> _Candidates:
-        """Return who may meet whom and what, as long as nobody is farther from here than `SKIN_M`."""
-        places = everybody[movers.rows]
-        who, other = pairs_near(places, everybody, self._apart_m + 2.0 * SKIN_M)
+    def _candidates(self, movers: Movers, bodies: Floats) -> _Candidates:
+        """Return the pairs that may meet, as long as no body is farther from here than `SKIN_M`."""
+        places = bodies[movers.rows]
+        who, other = pairs_near(places, bodies, self._apart_m + 2.0 * SKIN_M)
         is_other = (movers.rows[who] != other).nonzero()[0]
         met, what = self._standing.near(places[:, 0], places[:, 1])
         if movers.is_level:
@@ -118,15 +117,15 @@ class FreeWay:
             is_as_high = ((found.low < z + movers.high[met]) & (found.high > z + movers.low[met])).nonzero()[0]
             met, what = met[is_as_high], what[is_as_high]
         found = self._standing.solids.at(what)
-        return _Candidates(everybody, places[:, 2], who[is_other], other[is_other], met, found)
+        return _Candidates(bodies, places[:, 2], who[is_other], other[is_other], met, found)
 
-    def _planes(self, movers: Movers, everybody: Floats, candidates: _Candidates) -> _Planes:
-        """Return the planes half-way to others that are near."""
+    def _planes(self, movers: Movers, bodies: Floats, candidates: _Candidates) -> _Planes:
+        """Return the planes half-way to other near bodies."""
         who, other = candidates.who, candidates.other
         if not len(who):
             return _NO_PLANES
         own = movers.rows[who]
-        here, there = everybody[own], everybody[other]
+        here, there = bodies[own], bodies[other]
         dx, dy = there[:, 0] - here[:, 0], there[:, 1] - here[:, 1]
         way = np.sqrt(dx * dx + dy * dy)
         beside = way - (self._radius[own] + self._radius[other])
@@ -147,7 +146,7 @@ class FreeWay:
         return _Planes(who, nx, ny, nz, here[:, 0] * nx + here[:, 1] * ny + here[:, 2] * nz + room)
 
     def _solids(self, movers: Movers, places: Floats, candidates: _Candidates, numbers: Sequence[float]) -> _Met:
-        """Return the obstacles that are near, and who is in which of them already."""
+        """Return the near obstacles, and which of them the bodies overlap already."""
         who, found = candidates.met, candidates.what
         if self._rigid:
             moved, theirs = self._near_rigid(movers, places, numbers)
@@ -166,7 +165,7 @@ class FreeWay:
         return _Met(who, found, radius, depth, over, (depth < radius) & (over > 0.0))
 
     def _near_rigid(self, movers: Movers, places: Floats, numbers: Sequence[float]) -> tuple[Places, Solids]:
-        """Return who may meet which shapes of rigid bodies, as these are placed now."""
+        """Return the pairs of bodies and shapes of rigid bodies, as placed now, that may meet."""
         middles = np.array([_middle(one, numbers) for one in self._rigid])
         reach = self._apart_m + float(np.max(self._rigid_radius))
         who, other = pairs_near(places, middles, reach)
@@ -187,30 +186,30 @@ class FreeWay:
 
 
 class _Candidates(NamedTuple):
-    """Who may meet whom and what: a choice that changes nothing but the time that it takes to look.
+    """The pairs that may meet: a choice that changes only the processor time.
 
-    It was made where everybody was at these places, and those that move at these heights. `who` may meet `other` that
-    move, by their rows; `met` may meet `what` never moves.
+    It holds near these places of all bodies, and these heights of the movers. `who` may meet the moving `other`, by
+    their rows; `met` may meet the fixed `what`.
     """
 
-    everybody: Floats
+    bodies: Floats
     heights: Floats
     who: Places
     other: Places
     met: Places
     what: Solids
 
-    def hold(self, everybody: Floats, movers: Movers) -> bool:
-        """Whether nobody is too far from where the choice was made."""
-        moved = np.abs(everybody[:, 0:2] - self.everybody[:, 0:2])
+    def hold(self, bodies: Floats, movers: Movers) -> bool:
+        """Return whether each body is still near the place of the choice."""
+        moved = np.abs(bodies[:, 0:2] - self.bodies[:, 0:2])
         if not moved.max() <= SKIN_M:
             return False
-        return not movers.is_level or bool((everybody[movers.rows, 2] == self.heights).all())
+        return not movers.is_level or bool((bodies[movers.rows, 2] == self.heights).all())
 
 
 @dataclass(slots=True)
 class Movers:
-    """Bodies that one node moves: their rows among all that move, what they are to obstacles, how far they may go."""
+    """Bodies that one node moves: their rows among all movers, cylinders and greatest ways."""
 
     rows: Places
     radius: Floats
@@ -219,7 +218,7 @@ class Movers:
     way: Floats
     """At most in a tick (m)."""
     pieces: Floats
-    """In so many pieces a way is looked at, so that none is longer than the radius."""
+    """The count of pieces in which a way is checked: none is longer than the radius."""
     is_level: bool
     """Whether they keep their heights."""
     candidates: _Candidates | None = None
@@ -229,7 +228,7 @@ _NOTHING: Final = np.zeros(0)
 
 
 class _Planes(NamedTuple):
-    """Planes that some stay behind: who, the plane's unit normal, and the greatest place along it."""
+    """Planes that bound movers: the mover, the plane's unit normal, and the greatest place along it."""
 
     who: Places
     x: Floats
@@ -238,7 +237,7 @@ class _Planes(NamedTuple):
     most: Floats
 
     def along(self, places: Floats) -> Floats:
-        """Return how far those at these places are along the normals."""
+        """Return how far these places are along the normals."""
         here = places[self.who]
         found: Floats = here[:, 0] * self.x + here[:, 1] * self.y + here[:, 2] * self.z
         return found
@@ -248,7 +247,7 @@ _NO_PLANES: Final = _Planes(np.zeros(0, np.int64), _NOTHING, _NOTHING, _NOTHING,
 
 
 class _Met(NamedTuple):
-    """Obstacles that are near: to whom, sum of radii, distance and common height at the start, and whether it is in."""
+    """Near obstacles: the mover, sum of radii, distance and common height at the start, and whether they overlap."""
 
     who: Places
     solids: Solids
@@ -262,7 +261,7 @@ _NOTHING_MET: Final = _Met(np.zeros(0, np.int64), solids([]), _NOTHING, _NOTHING
 
 
 class Near:
-    """What some bodies may meet within one tick, whichever way they go."""
+    """The obstacles that some bodies may meet within one tick, in any direction."""
 
     def __init__(self, places: Floats, movers: Movers, planes: _Planes, met: _Met) -> None:
         self.places = places
@@ -271,7 +270,7 @@ class Near:
         self._pieces, self._planes, self._met = movers.pieces, planes, met
 
     def is_hit(self, start: Floats, ends: Floats) -> Flags:
-        """Return who cannot be at these ends, coming from a start; both are places of shape (n, 3)."""
+        """Return which bodies are blocked at these ends, coming from a start; both are places of shape (n, 3)."""
         hit = np.zeros(len(ends), bool)
         planes, met = self._planes, self._met
         if len(planes.who):
@@ -290,7 +289,7 @@ class Near:
         return hit
 
     def free_way(self, start: Floats, ways: Floats) -> tuple[Floats, Floats, Flags]:
-        """Return where they come to (m), which share of the way that is, and who was stopped.
+        """Return the reached places (m), the shares of the ways, and which bodies were stopped.
 
         `start` and `ways` have the shape (n, 3).
         """
@@ -302,10 +301,10 @@ class Near:
         return after(shares), shares, is_stopped
 
     def free_share(self, start: Floats, after: Callable[[Floats], Floats], moves: Flags) -> tuple[Floats, Flags]:
-        """Return which share of their ways they can go, and who was stopped.
+        """Return the free shares of the ways, and which bodies were stopped.
 
-        `after` returns where they are after a share of their ways each, of shape (n, 3); `moves` says who goes at all.
-        No way is looked at in pieces longer than the radius of who goes.
+        `after` returns the places after a share of each way, of shape (n, 3); `moves` flags the bodies with a way.
+        Ways are checked in pieces of at most the radius.
         """
         count = len(start)
         shares, is_stopped = np.ones(count), np.zeros(count, bool)

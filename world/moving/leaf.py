@@ -1,4 +1,4 @@
-"""What is in the way of a leaf, such as a door's: an upright box with a heading that slides among robots and objects.
+"""Obstacles of a leaf, such as a door's: an upright box with a heading that slides among robots and objects.
 
 A cylinder around a leaf would fill its doorway, so it is compared as a rectangle, seen from above, with its heights.
 What moves by kinematics is a cylinder, grown by how far it may come within the tick, so that both never overlap. Rigid
@@ -68,7 +68,7 @@ class InTheWay:
                 self._upright.append((entity, its.radius + body.speed_limit * tick_s, its.low, its.high))
 
     def stops(self, before: Leaf, after: Leaf, start: Sequence[float]) -> bool:
-        """Whether a leaf cannot go on from one place to another: there it is in something, and deeper than before.
+        """Return whether a leaf is blocked on the way to another place: it would overlap something more than before.
 
         `start` are the numbers at the start of the tick.
         """

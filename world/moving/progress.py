@@ -1,4 +1,4 @@
-"""Whether something that goes somewhere comes nearer: jobs of going fail when it does not for too long."""
+"""Progress towards a place: a job fails after too long without any."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Progress:
         view.write(self._waited, 0.0)
 
     def judge(self, view: WritableView, left_m: float, *, is_there: bool) -> JobState:
-        """Return what follows from the way that is left at the end of a tick, and whether that is none."""
+        """Return the state of the job by the way that is left at the end of a tick, or DONE at the goal."""
         if is_there:
             return JobState.DONE
         nearest = view.numbers[self._nearest.at]

@@ -1,4 +1,4 @@
-"""What stands in the way of upright bodies: each shape as a footprint with a band of heights, as columns of numbers.
+"""Obstacles of upright bodies: each shape as a footprint with a band of heights, as columns of numbers.
 
 A footprint is a rectangle grown by a radius: `rays.outlines.Rectangle` has the radius 0, `Circle` has sides of 0.
 """
@@ -22,14 +22,14 @@ Floats: TypeAlias = NDArray[np.float64]
 Places: TypeAlias = NDArray[np.int64]
 CELL_M: Final = 1.0
 CELLS_OF_ONE_MAX: Final = 4096
-"""What is in the reach of more cells is compared with everybody."""
+"""A solid in the reach of more cells is compared with each body."""
 CELLS_MAX: Final = 2**20
-"""Cells lie this far from the origin at most, in either direction; what is farther out is in the last one."""
+"""Cells lie this far from the origin at most, in either direction; farther places are in the last one."""
 STRIDE: Final = 2**22
 PLACES_FEW: Final = 64
-"""Of so many places at most cells are looked up one by one: it costs less than searching for all at once."""
+"""Up to this count of places cells are looked up one by one: it costs less than searching for all at once."""
 PAIRS_FEW: Final = 4096
-"""So many pairs at most are compared one and all: it costs less than sorting."""
+"""Up to this count all pairs are compared: it costs less than sorting."""
 
 
 class Solids:
@@ -55,11 +55,11 @@ class Solids:
         self.radius, self.low, self.high = columns[6:]
 
     def at(self, chosen: Places | NDArray[np.bool_]) -> Solids:
-        """Return those that are chosen."""
+        """Return the chosen ones."""
         return Solids(self.columns[:, chosen])
 
     def beside(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Return how far a place beside each is beyond its first and its second sides; negative between them."""
+        """Return how far a place is beyond the first and the second sides of each; negative between them."""
         east, north = x - self.x, y - self.y
         along = np.abs(east * self.along_x + north * self.along_y) - self.half_along
         across = np.abs(north * self.along_x - east * self.along_y) - self.half_across
@@ -83,19 +83,19 @@ def solids(rows: Iterable[tuple[float, ...]]) -> Solids:
 
 
 def joined(parts: Iterable[Solids]) -> Solids:
-    """Return several one behind the other."""
+    """Return the parts in one, in their order."""
     return Solids(np.concatenate([one.columns for one in parts], axis=1))
 
 
 def distance(along: Floats, across: Floats) -> Floats:
-    """Return how far places are from rectangles, of what `Solids.beside` returned; negative inside."""
+    """Return the distances of places from rectangles, by the result of `Solids.beside`; negative inside."""
     outside_along, outside_across = np.maximum(along, 0.0), np.maximum(across, 0.0)
     outside = np.sqrt(outside_along * outside_along + outside_across * outside_across)
     return np.where((along <= 0.0) & (across <= 0.0), np.maximum(along, across), outside)
 
 
 def scenery_of(spec: WorldSpec) -> Iterator[Shape]:
-    """Yield the scenery of a world; meshes whose files were not given are left out."""
+    """Yield the scenery of a world; meshes without their files are left out."""
     yield from fixed_shapes(spec)
     for name, thing in sorted(spec.scenery.items()):
         mesh = spec.mesh_of(name)
@@ -111,7 +111,7 @@ def cells_of(x: Floats, y: Floats, side: float) -> Places:
 
 
 def ranges(starts: Places, ends: Places) -> tuple[Places, Places]:
-    """Return the numbers of several ranges one behind the other, and beside each the index of its range."""
+    """Return the concatenated numbers of ranges, and for each number the index of its range."""
     counts = ends - starts
     which = np.repeat(np.arange(len(starts)), counts)
     first = np.cumsum(counts) - counts
@@ -119,7 +119,7 @@ def ranges(starts: Places, ends: Places) -> tuple[Places, Places]:
 
 
 class Standing:
-    """What never moves, by the cells of a grid in which somebody who reaches `reach_m` far may meet it."""
+    """Fixed solids, by the cells of a grid in which a body with the reach `reach_m` may meet them."""
 
     def __init__(self, rows: Iterable[tuple[float, ...]], reach_m: float) -> None:
         self.solids = solids(rows)
@@ -180,9 +180,9 @@ class Standing:
 
 
 def pairs_near(own: Floats, others: Floats, reach_m: float) -> tuple[Places, Places]:
-    """Return pairs of places of two kinds, shape (n, 2 or more), that are no farther apart in x and y than the reach.
+    """Return pairs of places of two kinds, shape (n, 2 or more), within the reach of each other in x and y.
 
-    Some that are farther apart are among them: of many, all in neighbouring cells of a grid are.
+    Some pairs are farther apart: with many places the result is all pairs in neighbouring cells of a grid.
     """
     if len(own) * len(others) <= PAIRS_FEW:
         apart = np.abs(own[:, None, :2] - others[None, :, :2]) <= reach_m

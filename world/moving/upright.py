@@ -1,6 +1,6 @@
 """Bodies that move upright, as they meet obstacles: cylinders on their places.
 
-A model whose robots move by kinematics may say what its cylinder is by a method `upright()`; of any other it is the
+A model of robots that move by kinematics may define its cylinder by a method `upright()`; of any other it is the
 one around its body.
 """
 
@@ -33,7 +33,7 @@ def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
 
 
 def stands_upright(settings: EntitySettings) -> bool:
-    """Whether robots with these settings move by kinematics and say what their cylinder is, and are no kit's."""
+    """Whether robots with these settings move by kinematics, define their cylinder, and belong to no kit."""
     model = settings.component_type
     return (
         model.motion is not None
@@ -44,7 +44,7 @@ def stands_upright(settings: EntitySettings) -> bool:
 
 
 def is_upright(model: Any) -> bool:
-    """Whether a model that moves is a cylinder to obstacles; one whose `is_upright` is False is what its shapes are."""
+    """Whether a moving model is a cylinder to obstacles; with `is_upright` False its shapes count."""
     return bool(model.is_upright)
 
 
@@ -54,7 +54,7 @@ def upright_of(model: Any) -> Upright:
     if found is not None:
         return found
     body = model.body()
-    assert body is not None, "what has no body meets nothing"
+    assert body is not None, "an entity without a body has no cylinder"
     return around(body)
 
 

@@ -69,7 +69,7 @@ export class Connection {
     this._asked += 1;
     const id = this._asked;
     return new Promise((resolve, reject) => {
-      if (!this.send({ type: "ask", id, source, verb, arguments: given })) {
+      if (!this.send({ type: "request", id, source, verb, arguments: given })) {
         reject(new Error(`${verb}: not connected`));
         return;
       }

@@ -44,7 +44,7 @@ export class Network {
     this.sorted = { column: 5, down: false };
     this.radioOnly = false;
     this.summary = h("p", { class: "summary" });
-    this.disturbances = h("ul", { class: "disturbances", "aria-label": "Disturbances that were asked for" });
+    this.disturbances = h("ul", { class: "disturbances", "aria-label": "Requested disturbances" });
     this.filter = h("input", { type: "search", placeholder: "Find links", "aria-label": "Find links by end, rule or cause", oninput: () => this.draw() });
     this.body = h("tbody");
     this.more = h("p", { class: "hint" });

@@ -54,7 +54,7 @@ export function lanesOf(report) {
   }
   for (const { at_ns, kind, text, by } of report.events.filter((event) => event.by !== "deployment")) {
     const name = by === "rules" ? kind : by;
-    const mark = by === "asked for" ? "request" : kind;
+    const mark = by === "requested" ? "request" : kind;
     const lane = lanes.get(name) ?? { name, mark, look: report.looks[kind], entries: [] };
     lane.entries.push({ from: at_ns / 1e9, text: `${+(at_ns / 1e9).toPrecision(9)} s: ${text}` });
     lanes.set(name, lane);

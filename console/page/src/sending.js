@@ -1,4 +1,4 @@
-// Sending robots where one clicks: the console's jobs of the selected robot, and the place that is asked for next.
+// Sending robots where one clicks: the console's jobs of the selected robot, and the next place.
 
 import { button, byId, field, h, keyed, setText } from "./ui.js";
 

@@ -191,7 +191,7 @@ test("a run that has ended is said, with its capture, whatever becomes of the co
   const store = new Store();
   store.take({ type: "welcome", role: "viewer", version: "1", sources: [INFO] });
   const ended = { type: "presence", source: 0, state: "ended", failed: false, text: "The run has ended at tick 5: done." };
-  const away = { type: "presence", source: 0, state: "away", text: "lost run; it is looked for" };
+  const away = { type: "presence", source: 0, state: "away", text: "lost run; reconnecting" };
   assert.equal(bannerOf("", store.main.presence), "");
   store.take(away);
   assert.deepEqual([bannerOf("", store.main.presence), stateOf(true, store.main.presence, "running")], [away.text, "supervisor away"]);
@@ -201,7 +201,7 @@ test("a run that has ended is said, with its capture, whatever becomes of the co
   assert.equal(stateOf(true, { ...ended, failed: true }, "running"), "failed");
 });
 
-test("a console whose run has ended is asked for every 15 s, another one sooner, until it is back", () => {
+test("a console whose run has ended is requested every 15 s, another one sooner, until it is back", () => {
   const [sockets, waits, told] = [[], [], []];
   globalThis.window = { setTimeout: (_, wait_ms) => waits.push(wait_ms) };
   globalThis.WebSocket = class {

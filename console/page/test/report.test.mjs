@@ -61,7 +61,7 @@ const REPORT = {
   events: [
     { at_ns: 1e9, kind: "goal", text: "goal of red", by: "rules" },
     { at_ns: 2e9, kind: "network", text: "clog", by: "deployment" },
-    { at_ns: 3e9, kind: "push", text: "push ball", by: "asked for" },
+    { at_ns: 3e9, kind: "push", text: "push ball", by: "requested" },
     { at_ns: 4e9, kind: "recovery", text: "loss n1", by: "recovery" },
   ],
   looks: { goal: "star" },
@@ -100,7 +100,7 @@ test("spans and events have a lane for each kind, events of the deployment that 
   const lanes = lanesOf(REPORT);
   assert.deepEqual(lanes.map(({ name, mark, look }) => [name, mark, look]), [
     ["partition", undefined, undefined], ["settings", undefined, undefined],
-    ["goal", "goal", "star"], ["asked for", "request", undefined], ["recovery", "recovery", undefined],
+    ["goal", "goal", "star"], ["requested", "request", undefined], ["recovery", "recovery", undefined],
   ]);
   assert.deepEqual(lanes[0].entries, [{ from: 10, to: 20, text: "10 s to 20 s: a | b" }]);
   assert.deepEqual(lanes[3].entries, [{ from: 3, text: "3 s: push ball" }]);

@@ -28,8 +28,8 @@ _ENTRY = struct.Struct("<BHHH")
 
 
 class Beacon(NamedTuple):
-    """Where a rover is (m, rad), between which spots of the roadmap, its charge (a share), what it sees that is not on
-    the map (m), and the spots where it was, each with how long ago (s)."""
+    """Where a rover is (m, rad), between which spots of the roadmap, its charge (a share), a seen thing outside of
+    the map (m), and the visited spots, each with its age (s)."""
 
     number: int
     x: float

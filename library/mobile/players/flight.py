@@ -53,7 +53,7 @@ class Navigation:
         self._force = (0.0, 0.0, gravity)
 
     def move(self, felt: Inertial, time_s: float) -> None:
-        """Take what the inertial unit has measured over a time."""
+        """Take a measurement of the inertial unit over a time."""
         self.spin = felt.wx, felt.wy, felt.wz
         rate = _length(self.spin)
         if rate > 0.0:
@@ -114,7 +114,7 @@ class Flight:
     def _torques(self, at: Navigation, wanted: Vector, yaw: float) -> Vector:
         """Return the torques (N m, own axes) that turn z along the wanted force, and x to the heading.
 
-        The error of the attitude is half of the part of R_d^T R that is not symmetric.
+        The error of the attitude is half of the skew-symmetric part of R_d^T R.
         """
         length = _length(wanted)
         z = wanted[0] / length, wanted[1] / length, wanted[2] / length
@@ -137,7 +137,7 @@ class Flight:
     def _mixed(self, thrust: float, torques: Vector) -> tuple[float, float, float, float]:
         """Return the rotors' speeds for a thrust (N) and torques (N m): front left, rear left, rear right, front right.
 
-        The inverse of what the actuator `rotor_speeds` adds up.
+        The inverse of the sums of the actuator `rotor_speeds`.
         """
         roll, pitch, yaw = torques[0] / self._arm, torques[1] / self._arm, torques[2] / self._drag
         quarters = (

@@ -95,7 +95,7 @@ class Steering:
             return self._away(ranges)
         forward = min(speed, max(APPROACH * way, SPEED_MIN), APPROACH * max(ahead - STOP_M, 0.0)) * max(cos(error), 0.0)
         turning = min(max(TURN_GAIN * error, -TURN_MAX), TURN_MAX) * self._track / 2.0
-        # Turning goes first: what is too fast for the wheels is taken from the way ahead.
+        # Turning has priority: the excess over the wheels' speed is taken from the way ahead.
         forward = min(forward, max(self._speed_max - abs(turning), 0.0))
         limit = self._speed_max
         return Drive(max(-limit, min(limit, forward - turning)), max(-limit, min(limit, forward + turning)))

@@ -30,7 +30,7 @@ class Dispatch(Player):
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
         cell_m = {"cell_m": 2.5, **parameters}.pop("cell_m")
         if set(parameters) - {"cell_m"}:
-            raise BadValue("no parameter of a dispatch but cell_m", ", ".join(sorted(set(parameters) - {"cell_m"})))
+            raise BadValue("a dispatch has only the parameter cell_m", ", ".join(sorted(set(parameters) - {"cell_m"})))
         if isinstance(cell_m, bool) or not isinstance(cell_m, int | float) or not 0.0 < cell_m < 1000.0:
             raise BadValue("parameter cell_m is not a number above 0", cell_m)
         self.fleet: dict[int, tuple[float, Telemetry]] = {}

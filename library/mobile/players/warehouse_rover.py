@@ -1,8 +1,8 @@
-"""Patrol: the on-board software of a rover that walks a hall with others, and shares what it knows by radio.
+"""Patrol: the on-board software of a rover that patrols a hall with others, and shares its knowledge by radio.
 
-It goes from spot to spot of the roadmap, always to the neighbouring one that was visited longest ago, by itself or by
-whom it hears (conscientious reactive patrolling with shared idleness: Machado, Ramalho, Zucker, Drogoul, MABS 2002). It
-keeps out of the spots that others are at or head for, and gives way to those with a smaller number. With little charge
+It moves from spot to spot of the roadmap, always to the neighbouring one with the oldest visit, by itself or by rovers
+in reach (conscientious reactive patrolling with shared idleness: Machado, Ramalho, Zucker, Drogoul, MABS 2002). It
+keeps out of the spots that others are at or head for, and gives way to rovers with a smaller number. With little charge
 it goes to the charger. Without a message for a while it slows down and relies on its proximity sensor alone.
 """
 
@@ -56,7 +56,7 @@ STUCK_S: Final = 4.0
 GIVEN_UP_S: Final = 10.0
 """for so long."""
 NEAR_M: Final = 1.2
-"""What is not on the map, and nearer than this where it is going, it turns away from,"""
+"""It turns away from things outside of the map that are nearer than this on its course,"""
 AVOIDED_S: Final = 3.0
 """and keeps to that for so long."""
 SIDE_RAD: Final = 1.2
@@ -74,7 +74,7 @@ class Settings:
     """The player that gets telemetry; none if it is empty."""
     cell_m: float = 2.5
     speed: float = 1.0
-    """m/s, of a rover that is not alone."""
+    """m/s, of a rover in contact with others."""
     alone_speed: float = 0.5
     alone_s: float = 3.0
     """A rover is alone after this time without a message."""
@@ -98,9 +98,9 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     settings = Settings(**{"rover": "", **parameters})
     rovers = [name for name, robot in deployment.robots.items() if isinstance(robot, RoverRobot)]
     if settings.rover not in rovers:
-        raise UnknownName("parameter rover is no rover", settings.rover, rovers)
+        raise UnknownName("parameter rover is not a rover", settings.rover, rovers)
     if settings.base and settings.base not in deployment.players:
-        raise UnknownName("parameter base is no player", settings.base, deployment.players)
+        raise UnknownName("parameter base is not a player", settings.base, deployment.players)
     if len(rovers) > ROVERS_MAX:
         raise BadValue(f"a patrol has at most {ROVERS_MAX} rovers", len(rovers))
     if not settings.low < settings.high <= 1.0:
@@ -189,24 +189,24 @@ class Patrol(Player):
             if channel not in (BEACON, FLEET) or self._sequences.get(source) == sample.sequence:
                 continue
             self._sequences[source] = sample.sequence
-            said_s = sample.sent_ns / 1e9
+            sent_s = sample.sent_ns / 1e9
             if channel == BEACON:
                 beacon = decode_beacon(sample.value, self._count, len(self._map.spots))
                 if beacon is not None and beacon.number != self.number:
-                    self._take_beacon(beacon, said_s)
+                    self._take_beacon(beacon, sent_s)
             else:
                 for entry in decode_fleet(sample.value, self._count, len(self._map.spots)) or ():
-                    self._hear(entry.number, Heard(said_s - entry.age, entry.here, entry.goal))
+                    self._hear(entry.number, Heard(sent_s - entry.age, entry.here, entry.goal))
         self.is_alone = now_s - self._heard_s >= self.settings.alone_s
 
-    def _take_beacon(self, beacon: Beacon, said_s: float) -> None:
-        self._heard_s = max(self._heard_s, said_s)
-        self._hear(beacon.number, Heard(said_s, beacon.here, beacon.goal))
-        self._visited_s[beacon.here] = max(self._visited_s[beacon.here], said_s)
+    def _take_beacon(self, beacon: Beacon, sent_s: float) -> None:
+        self._heard_s = max(self._heard_s, sent_s)
+        self._hear(beacon.number, Heard(sent_s, beacon.here, beacon.goal))
+        self._visited_s[beacon.here] = max(self._visited_s[beacon.here], sent_s)
         for spot, age in beacon.visits:
-            self._visited_s[spot] = max(self._visited_s[spot], said_s - age)
+            self._visited_s[spot] = max(self._visited_s[spot], sent_s - age)
         if beacon.seen is not None and not self.is_at(*beacon.seen):
-            self._block(self._map.nearest(*beacon.seen), said_s + SIGHT_S)
+            self._block(self._map.nearest(*beacon.seen), sent_s + SIGHT_S)
 
     def _hear(self, number: int, heard: Heard) -> None:
         """Keep the newer report."""
@@ -219,7 +219,7 @@ class Patrol(Player):
         return hypot(x - self._estimate.x, y - self._estimate.y) <= 2.0 * self._rays_from
 
     def _look(self, ranges: tuple[float, ...], now_s: float) -> None:
-        """Find the nearest thing that is not on the map."""
+        """Find the nearest thing outside of the map."""
         self._seen = None
         if not ranges:
             return
@@ -254,7 +254,7 @@ class Patrol(Player):
             self._head_for(self._next(now_s), now_s)
         elif self._must_give_way(now_s):
             self._head_for(self._here, now_s)
-        elif self._meets_somebody() and now_s >= self._avoided_s:
+        elif self._meets_obstacle() and now_s >= self._avoided_s:
             self._avoided_s = now_s + AVOIDED_S
             self._here = self._map.nearest(x, y)
             self._head_for(self._away(now_s), now_s)
@@ -279,8 +279,8 @@ class Patrol(Player):
             known.here == self._goal or (known.goal == self._goal and number < self.number) for number, known in claims
         )
 
-    def _meets_somebody(self) -> bool:
-        """Whether something that is not on the map is near, and about where it is going."""
+    def _meets_obstacle(self) -> bool:
+        """Whether a thing outside of the map is near, and about where it is going."""
         if self._seen is None:
             return False
         at, goal = self._estimate, self._map.spots[self._goal]
@@ -296,7 +296,7 @@ class Patrol(Player):
         return max(free, key=lambda spot: (self._map.distance(spot, *seen), -spot), default=self._here)
 
     def _next(self, now_s: float) -> int:
-        """Return the spot to go to from here; here, when there is none that is free."""
+        """Return the spot to go to from here; this one if no other is free."""
         here, claimed = self._here, self._claimed(now_s)
         if self.charging:
             if here in self._chargers:

@@ -1,4 +1,4 @@
-"""The controller of a quadrotor that watches a yard: it takes off, circles, and passes on by radio what scouts say.
+"""The controller of a quadrotor that watches a yard: it takes off, circles, and forwards the scouts' reports by radio.
 
 From above it has a line of sight to both sides of a wall, so that a scout hears of another one behind it.
 """
@@ -56,9 +56,9 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     settings = Settings(**{"quadrotor": "", **parameters})
     flyers = sorted(name for name, its in deployment.robots.items() if isinstance(its, QuadrotorRobot))
     if settings.quadrotor not in flyers:
-        raise UnknownName("parameter quadrotor is no quadrotor", settings.quadrotor, flyers)
+        raise UnknownName("parameter quadrotor is not a quadrotor", settings.quadrotor, flyers)
     if deployment.origin is None:
-        raise BadValue("a quadrotor that flies by satellites needs the deployment's origin on Earth")
+        raise BadValue("a quadrotor with satellite navigation needs the deployment's origin on Earth")
     return settings
 
 
@@ -83,7 +83,7 @@ class Watch(Player):
         self._watch_s = 0.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
-        """Fly on, and pass on what was heard."""
+        """Continue the flight, and forward reports."""
         now_s, name = tick * self._tick_s, self.settings.quadrotor
         self._sense(samples)
         self.heard.take(samples)

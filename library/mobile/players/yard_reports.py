@@ -86,7 +86,7 @@ class Heard:
         """By the number of the scout."""
 
     def take(self, samples: Samples) -> None:
-        """Take what has come."""
+        """Take arrived reports."""
         for (_, channel), sample in samples.items():
             if channel == REPORT:
                 report = decode_report(sample.value)

@@ -1,7 +1,7 @@
 """The on-board software of a scout in a yard: it pushes crates along x, one after the other.
 
-Of two scouts the first one is told where crates stand at the start, and pushes each as far as the border; the second
-one hears by radio where they are then, and pushes them on. A scout goes behind a crate, looks at it with its laser
+Of two scouts the first one has the places of crates at the start, and pushes each as far as the border; the second
+one receives their new places by radio, and pushes them further. A scout goes behind a crate, looks at it with its laser
 scanner, puts its bumper against it, and pushes it along a line. Pushed by a plate, a crate stays where it is on that
 while the way bends little (stable pushing: Lynch, Mason, *Stable Pushing*, Int. J. Robotics Research 15(6), 1996).
 
@@ -57,7 +57,7 @@ ECHOES_MIN: Final = 3
 LOST_M: Final = 0.2
 """A crate that is pushed is no farther from the scanner; one that is has been lost,"""
 LOST_TURNS: Final = 5
-"""if that is so for so many turns."""
+"""if that lasts for this count of turns."""
 BACK_SPEED: Final = 0.35
 REPORT_S: Final = 0.2
 
@@ -71,7 +71,7 @@ class Settings:
     goals: tuple[float, ...]
     """x of the middle of each crate at the end of its way, in the order of the crates."""
     crates: tuple[str, ...] = ()
-    """The crates, by their names in the deployment, whose places it is told; empty: it hears of them by radio."""
+    """The crates, by their names in the deployment, whose first places it has; empty: it receives them by radio."""
     detour: float = 0.0
     """It goes along the line at this y, on the side of the crate, to get behind it; 0: along the middle."""
     back: float = 0.5
@@ -104,11 +104,11 @@ def read_settings(parameters: Mapping[str, Any], deployment: Deployment) -> Sett
     scouts = sorted(name for name, its in deployment.robots.items() if isinstance(its, DifferentialDriveRobot))
     for name in (settings.scout, settings.partner):
         if name not in scouts:
-            raise UnknownName("parameter scout or partner is no differential drive", name, scouts)
+            raise UnknownName("parameter scout or partner is not a differential drive", name, scouts)
     boxes = sorted(name for name, its in deployment.objects.items() if isinstance(its, BoxObject))
     for name in settings.crates:
         if name not in boxes:
-            raise UnknownName("parameter crates names no box", name, boxes)
+            raise UnknownName("parameter crates names other than a box", name, boxes)
     if settings.crates and len(settings.crates) != len(settings.goals):
         raise BadValue("parameter goals has a number for each crate", len(settings.goals))
     return settings
@@ -135,7 +135,7 @@ class Scout(Player):
         self._tick_s = deployment.tick_ns / 1e9
         scanner = robot.sensors.get("scan")
         if not isinstance(scanner, LaserScannerSettings):
-            raise BadValue("a scout has a laser scanner named scan", settings.scout)
+            raise BadValue("a scout needs a laser scanner named scan", settings.scout)
         first, _ = scanner.bearings
         step = step_of(scanner.rays, scanner.angle)
         self._bearings = [first + ray * step for ray in range(scanner.rays)]
@@ -145,7 +145,7 @@ class Scout(Player):
         bumper = 0.0 if robot.bumper is None else 2.0 * BUMPER_HALF_M
         self._reach = robot.radius + bumper + self._crate_half
         """From its middle to that of a crate at its bumper (m)."""
-        self._told = [deployment.objects[name].at for name in settings.crates]  # type: ignore[attr-defined]
+        self._first_places = [deployment.objects[name].at for name in settings.crates]  # type: ignore[attr-defined]
         self._crate = (0.0, 0.0)
         self._way: list[tuple[float, float]] = []
         self._line = 0.0
@@ -155,7 +155,7 @@ class Scout(Player):
         self._report_s = 0.0
 
     def act(self, tick: int, samples: Samples) -> Turn:
-        """Drive, and say where it is five times a second."""
+        """Drive, and report its place five times a second."""
         now_s, robot = tick * self._tick_s, self.settings.scout
         travel, pose = samples.get((robot, "odometry")), samples.get((robot, "pose"))
         if travel is not None and isinstance(travel.value, WheelTravel):
@@ -189,7 +189,7 @@ class Scout(Player):
                 return self._back()
         return STANDING
 
-    # --- what it does next -------------------------------------------------------------------------------------------
+    # --- decisions ---------------------------------------------------------------------------------------------------
 
     def _wait(self) -> Motion:
         """Begin with the next crate, when it may."""
@@ -197,11 +197,11 @@ class Scout(Player):
         if number == len(self.settings.goals):
             return STANDING
         partner = self.heard.reports.get(self._partner)
-        if self._told:
+        if self._first_places:
             # One crate stands at the border at most while another comes.
             if number >= 2 and (partner is None or partner.done < number - 1):
                 return STANDING
-            self._crate = self._told[number].x, self._told[number].y
+            self._crate = self._first_places[number].x, self._first_places[number].y
         else:
             if partner is None or len(partner.crates) <= number or partner.x > self.settings.clear:
                 return STANDING
@@ -282,10 +282,10 @@ class Scout(Player):
         self.phase = "look" if self._is_lost else "wait"
         return STANDING
 
-    # --- what it sees ------------------------------------------------------------------------------------------------
+    # --- perception --------------------------------------------------------------------------------------------------
 
     def _ahead(self, distances: tuple[float, ...]) -> float:
-        """Return how far it is ahead of the scanner to what is next (m)."""
+        """Return the distance ahead of the scanner to the next thing (m)."""
         near = [way for way, bearing in zip(distances, self._bearings, strict=False) if abs(bearing) < GUARD_RAD]
         return min(near, default=self._range)
 

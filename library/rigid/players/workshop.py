@@ -1,7 +1,7 @@
 """The foreman of a workshop: a porter carries crates to a crane, which hands them over to another one; then all back.
 
 The foreman has a list of steps, each of one aim or several, and takes the next step when all are reached by the samples
-that it hears. Grippers get jobs, joints and wheels get set-points at each turn: what the network loses is repeated. A
+that it hears. Grippers get jobs, joints and wheels get set-points at each turn: lost commands are repeated. A
 crate that was put elsewhere it tries to take again and again.
 """
 
@@ -77,8 +77,8 @@ class Foreman(Player):
         self._running: dict[str, Job] = {}
         """The jobs of the present step, by robot."""
         self._again_s = 0.0
-        self._told: dict[tuple[str, str], tuple[float, ...]] = {}
-        """What joints and wheels are to reach, from the last step that named them on."""
+        self._set_points: dict[tuple[str, str], tuple[float, ...]] = {}
+        """The set-points of joints and wheels, by the last step with one."""
         self._speed = 0.0
 
     def act(self, tick: int, samples: Samples) -> dict[str, dict[str, Any]]:
@@ -91,14 +91,14 @@ class Foreman(Player):
             self._running = {}
         for robot, actuator, numbers in self.steps[self.at]:
             if actuator != "gripper":
-                self._told[robot, actuator] = numbers
+                self._set_points[robot, actuator] = numbers
             elif robot not in self._running and now_s >= self._again_s:
                 self._running[robot] = self._jobs[robot].call(*numbers)
         commands: dict[str, dict[str, Any]] = {}
         for robot, jobs in self._jobs.items():
             job = jobs.due(tick)
             commands[robot] = {} if job is None else {"gripper": job}
-        for (robot, actuator), numbers in self._told.items():
+        for (robot, actuator), numbers in self._set_points.items():
             commands[robot][actuator] = self._wheels(numbers, samples) if actuator == "wheels" else numbers
         return {robot: its for robot, its in commands.items() if its}
 
@@ -167,7 +167,7 @@ class Plan:
         named: list[tuple[str, Mapping[str, Any]]] = [(name, arms) for name in self.robots]
         for name, known in (*named, *((name, boxes) for name in parameters["crates"])):
             if name not in known:
-                raise UnknownName("a parameter names what cannot be its porter, crane or crate", name, known)
+                raise UnknownName("a parameter names an unfit porter, crane or crate", name, known)
         porter, west, east = (arms[name].at for name in self.robots)
         self.hub: Final = porter.x, porter.y
         crates = [boxes[name] for name in parameters["crates"]]

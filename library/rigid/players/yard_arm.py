@@ -26,7 +26,7 @@ ASIDE_RAD: Final = 1.5
 NEAR_M: Final = 2.0
 """A scout is in the way of the arm if it is nearer than this to its foot."""
 SILENT_S: Final = 1.5
-"""A scout that was not heard for so long may be anywhere."""
+"""After this time without a report a scout may be anywhere."""
 THERE_RAD: Final = 0.05
 STAY_S: Final = 1.0
 """How long it stays over a lane."""
@@ -39,14 +39,14 @@ class Arm(Player):
         name, scouts = parameters.get("arm"), parameters.get("scouts")
         robot = deployment.robots.get(name) if isinstance(name, str) else None
         if not isinstance(name, str) or not isinstance(robot, UrdfRobot):
-            raise BadValue("parameter arm is no robot from a URDF file", name)
+            raise BadValue("parameter arm is not a robot from a URDF file", name)
         self._name = name
         if not isinstance(scouts, list) or set(parameters) != {"arm", "scouts"}:
             raise BadValue("the parameters are arm, and the list scouts", sorted(parameters))
         robots = sorted(deployment.robots)
         for scout in scouts:
             if scout not in robots:
-                raise UnknownName("parameter scouts names no robot", scout, robots)
+                raise UnknownName("parameter scouts names an unknown robot", scout, robots)
         self._scouts = [robots.index(scout) for scout in scouts]
         self._x, self._y, _ = robot.at.position
         self._tick_s = deployment.tick_ns / 1e9

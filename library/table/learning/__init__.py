@@ -1,1 +1,1 @@
-"""Environments of the football table for what learns: their rewards, and their arguments by id."""
+"""Environments of the football table for learning: their rewards, and their arguments by id."""

@@ -16,7 +16,7 @@ PLAYER: Final = (
     "players={player-red: {class: 'foosim.library.table.players.football:Passive', parameters: {team: red}, "
     "rate: 100 Hz, robots: {camera: [ball], red.goal: []}}}"
 )
-"""Nobody plays but red's goalkeeper."""
+"""Only red's goalkeeper plays."""
 ALONE: Final = (
     "robots={red.goal: {model: rod, team: red, line: goal}, camera: {model: camera, sensors: {ball: {kind: ball, "
     "rate: 100 Hz, modifiers: [{kind: delay, time: 10 ms}, {kind: gaussian_noise, std: {x: 1.5 mm, y: 1.5 mm}}]}}}}",

@@ -1,4 +1,4 @@
-"""Rewards of the football table for environments: where an episode begins, what it is worth, when it is over.
+"""Rewards of the football table for environments: where an episode begins, its reward, when it is over.
 
 `functools.partial` gives them settings.
 """
@@ -32,7 +32,7 @@ def teams_of(deployment: Deployment, robots: Robots) -> dict[str, str]:
     for agent, its in robots.items():
         teams = {getattr(deployment.robots[robot], "team", None) for robot in its}
         if len(teams) != 1 or not teams <= {*TEAMS}:
-            raise BadValue("no agent of one team of the table: it commands", ", ".join(its) or "nothing")
+            raise BadValue("an agent commands the rods of one team, this one", ", ".join(its) or "nothing")
         found[agent] = str(next(iter(teams)))
     return found
 
@@ -102,7 +102,7 @@ class DefendShot:
         """
         self._teams = teams_of(deployment, robots)
         if len(set(self._teams.values())) != 1:
-            raise BadValue("a shot is defended by one team, agents are of", sorted(set(self._teams.values())))
+            raise BadValue("a shot is defended by one team; agents are of", sorted(set(self._teams.values())))
         team = next(iter(self._teams.values()))
         table = table_of(deployment)
         self._other = next(other for other in TEAMS if other != team)
@@ -140,7 +140,7 @@ class DefendShot:
         return with_ball(self._deployment, with_feet_up(frame, self._lifted), position, velocity)
 
     def rate(self, before: Frame, after: Frame) -> Mapping[str, float]:
-        """Return 0 until the end, then what became of the shot."""
+        """Return 0 until the end, then the result of the shot."""
         worth = 0.0
         if self.is_over(after):
             worth = -1.0 if score_of(after)[self._other] > self._conceded else 1.0

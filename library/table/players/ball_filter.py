@@ -67,7 +67,7 @@ class BallTrack:
         return self._measured_ns != NEVER_NS
 
     def take(self, measured_ns: int, seen: BallPosition) -> None:
-        """Take what was measured at a time (ns); a sample that is not newer than the last changes nothing."""
+        """Take a measurement at a time (ns); a sample older than the last, or equally old, changes nothing."""
         if measured_ns <= self._measured_ns:
             return
         x, y = seen.x, seen.y

@@ -42,7 +42,7 @@ class ByHand:
         return [*self._rods.values()]
 
     def hold(self, line: LineName) -> None:
-        """Take hold of another rod; of one that is not there nothing."""
+        """Take hold of another rod; an unknown one changes nothing."""
         if line in self._rods:
             self.held = line
 

@@ -1,8 +1,8 @@
 """Players of the football table: a keeper, a striker, the team of both, and one that does nothing.
 
 They see packets only, noisy, late and some lost, and command rods by packets. Each is for either team (parameter
-`team`: red or blue), commands the rods that it hears, and judges the ball by its age: what is measured was so some
-milliseconds ago, and what is commanded happens some milliseconds later.
+`team`: red or blue), commands the rods that it hears, and accounts for latency: measurements are some
+milliseconds old, and commands take effect some milliseconds later.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Waiting(Protocol):
     """Where a rod waits for a ball that it does not strike now."""
 
     def y(self, rod: Rod, ball: View) -> float:
-        """Return where a figure shall stand."""
+        """Return the wanted place of a figure."""
 
 
 class Guarding:
@@ -70,7 +70,7 @@ class Following:
 
 
 class Hand:
-    """Plays one rod: strikes what it can, and waits in its own way for the rest."""
+    """Plays one rod: strikes balls in reach, and otherwise waits in its own way."""
 
     def __init__(self, rod: Rod, waiting: Waiting) -> None:
         self.rod = rod
@@ -103,7 +103,7 @@ class Playing:
         self._aim_key = draw_key(deployment.seed, "aim", team)
 
     def act(self, tick: int, samples: Samples) -> Commands:
-        """Return the command of each rod that was heard."""
+        """Return the command of each rod with a reading."""
         sight = self._senses.see(tick, samples)
         if sight is None:
             return {}
@@ -113,12 +113,12 @@ class Playing:
         for hand in self._hands:
             if hand.rod.seen:
                 command = hand.move(sight, arrives * self._tick_ns * 1e-9, goal)
-                hand.rod.tell(command, arrives)
+                hand.rod.note(command, arrives)
                 commands[hand.rod.name] = command
         return commands
 
     def _aim(self, tick: int) -> float:
-        """Return the y at which shots aim in this quarter of a second: a keyed draw, so that nobody can tell."""
+        """Return the y at which shots aim in this quarter of a second: a keyed draw, so that it is unpredictable."""
         word = draw_words(self._aim_key, tick * self._tick_ns // AIM_NS)[0]
         return self._aim_y if word & 1 else -self._aim_y
 
@@ -137,7 +137,7 @@ def _striker(deployment: Deployment, team: str) -> list[Hand]:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Keeper(Player):
-    """Guards with the goal and defence rods, and clears what it can reach. Parameter: `team`, red or blue."""
+    """Guards with the goal and defence rods, and clears balls in reach. Parameter: `team`, red or blue."""
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
         team = team_of(parameters)

@@ -125,7 +125,7 @@ def _opened(device: str) -> int:
         return os.open(device, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
         there = ", ".join(sorted(glob.glob("/dev/input/js*"))) or "none"
-        raise BadValue(f"there is no such gamepad (there are: {there})", device) from None
+        raise BadValue(f"unknown gamepad (there are: {there})", device) from None
     except OSError as error:
         advice = "; its group is usually `input`" if error.errno == errno.EACCES else ""
         raise BadValue(f"the gamepad cannot be read, {error.strerror}{advice}", device) from None

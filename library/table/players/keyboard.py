@@ -104,7 +104,7 @@ def _terminal() -> int:
             "command that `up` prints"
         )
     if not is_foreground(stream.fileno()):
-        raise BadValue("the keyboard needs its terminal: this process is in the background of it")
+        raise BadValue("the keyboard needs its terminal: this process is in the background")
     return stream.fileno()
 
 

@@ -1,4 +1,4 @@
-"""A rod's motors as its player foresees them: a reading is old, and what was commanded since moves the rod meanwhile.
+"""A rod's motors as its player foresees them: a reading is old, and later commands move the rod meanwhile.
 
 The loop is that of the actuator `rod_position`: once a tick, target speed = gain x error, within +-speed; the motor
 reaches it with at most its acceleration without a load. What else moves a rod, the next reading shows.
@@ -64,12 +64,12 @@ class Motors:
         self._commands: deque[tuple[int, float, float]] = deque()
         """Set-points in the order of the ticks from which they hold; the first one holds at the reading's tick."""
 
-    def tell(self, tick: int, slide: float, spin: float) -> None:
+    def note(self, tick: int, slide: float, spin: float) -> None:
         """Note set-points (m, rad) that hold from a tick on."""
         self._commands.append((tick, slide, spin))
 
     def see(self, tick: int, slide: float, spin: float) -> None:
-        """Take a reading (m, rad) of a tick; one that is not newer than the last changes nothing.
+        """Take a reading (m, rad) of a tick; one older than the last, or equally old, changes nothing.
 
         Its speeds are those foreseen: the loop corrects them within some ticks.
         """

@@ -23,13 +23,13 @@ from foosim.world.layout import Layout
 TURN: Final = 2.0 * pi
 SWING_S_MAX: Final = 0.1
 CLEAR_M: Final = 0.004
-"""Beyond this distance beside or behind a ball a foot does not touch it: what noise and delay leave uncertain."""
+"""Beyond this distance beside or behind a ball a foot does not touch it: a margin for noise and delay."""
 NEAR_M: Final = 0.15
 """A rod whose ball is farther away turns back to the turn that it started in."""
 
 
 PAST_M: Final = 0.005
-"""A ball that was seen no farther behind the front of the feet than this may have been stopped by them."""
+"""A ball seen at most this far behind the front of the feet may have been stopped by them."""
 LOW_RAD: Final = 0.5
 """Feet within this of straight down stop a ball."""
 FLIES_M: Final = 0.045
@@ -57,7 +57,7 @@ class View(NamedTuple):
 class Sight(NamedTuple):
     """What a team knows of the ball: as it will be when a command arrives, and as it was seen last.
 
-    One that is not `is_steady` has just been kicked or blocked: where it goes is a guess. `height` (m) is the greater
+    Without `is_steady` it has just been kicked or blocked: its course is a guess. `height` (m) is the greater
     one of the last two pictures.
     """
 
@@ -113,9 +113,9 @@ class Rod:
         self.slide = slide.at
         self.swing, self.turning = -self._side * spin.at, -self._side * spin.speed
 
-    def tell(self, command: Command, tick: int) -> None:
-        """Note that a command was sent which moves it from a tick on."""
-        self._motors.tell(tick, command.slide, command.spin)
+    def note(self, command: Command, tick: int) -> None:
+        """Note a sent command that moves it from a tick on."""
+        self._motors.note(tick, command.slide, command.spin)
 
     def command(self, slide: float, swing: float) -> Command:
         """Return the command for a slide and a swing in the team's view."""

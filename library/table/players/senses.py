@@ -1,4 +1,4 @@
-"""What a team's player knows: its rods, the ball's track, and how old what it hears is."""
+"""The state of a team's player: its rods, the ball's track, and the ages of readings."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Senses:
     def see(self, tick: int, samples: Samples) -> Sight | None:
         """Return the ball, as it will be when a command that is sent now reaches a rod; None before it was seen.
 
-        The rods that were heard are set to that tick, too. A command is taken to be on its way for as long as pictures
+        Rods with a reading are set to that tick, too. A command is taken to be on its way for as long as pictures
         are.
         """
         for pair, latency_ns in self._cameras.items():

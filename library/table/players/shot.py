@@ -17,7 +17,7 @@ from foosim.library.table.rod_position import Command
 LIFTED: Final = -1.7
 """rad: feet behind the rod and above the ball, which passes."""
 DOWN: Final = -0.1
-"""Feet down, a little behind: what comes up to them is sent down."""
+"""Feet down, a little behind: a ball that comes up to them is sent down."""
 HIGH_M: Final = 0.026
 """A ball whose centre is higher than this would be hit below it."""
 COMES_FAST: Final = 2.5

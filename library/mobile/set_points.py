@@ -1,6 +1,6 @@
-"""What actuators ask of motors, of many entities at once: an array of shape (entities, motors, 2).
+"""Set-points of motors, of many entities at once: an array of shape (entities, motors, 2).
 
-Of each motor it is the target speed, and the greatest force or acceleration.
+Each has the target speed, and the greatest force or acceleration.
 """
 
 from __future__ import annotations
@@ -21,50 +21,50 @@ from foosim.world.moving.columns import Columns
 Floats: TypeAlias = NDArray[np.float64]
 
 
-def asked_of(motors: Sequence[Motors] | Floats, without: Motors) -> Floats:
-    """Return what is asked as an array; `without` is what is asked of an entity of which nothing is asked."""
+def set_points_of(motors: Sequence[Motors] | Floats, without: Motors) -> Floats:
+    """Return set-points as an array; `without` are those of an entity without a command."""
     if isinstance(motors, np.ndarray):
         return motors
     numbers = np.fromiter(chain.from_iterable(chain.from_iterable(its or without for its in motors)), float)
     return numbers.reshape(len(motors), len(without), 2)
 
 
-class MotionsAsked(Rows):
-    """What the actuators `v_w` of robots that move by kinematics ask of their wheels."""
+class MotionSetPoints(Rows):
+    """The set-points of wheels by the actuators `v_w` of robots that move by kinematics."""
 
     def __init__(self, set_points: Sequence[Slot], wheels: Sequence[Wheels]) -> None:
         assert not any(its.motors for its in wheels), "wheels with motors are those of rigid robots"
         self._set_points = Columns([[slot] for slot in set_points])
         self._half_track = np.array([its.track / 2.0 for its in wheels])
         self._speed = np.array([its.speed for its in wheels])
-        self._asked = np.empty((len(wheels), 2, 2))
-        self._asked[:, :, 1] = np.array([its.acceleration for its in wheels])[:, None]
+        self._at_rest = np.empty((len(wheels), 2, 2))
+        self._at_rest[:, :, 1] = np.array([its.acceleration for its in wheels])[:, None]
 
     def command(self, view: View) -> Floats:
-        """Return what is asked, of shape (robots, 2, 2)."""
+        """Return the set-points, of shape (robots, 2, 2)."""
         linear, angular = self._set_points.read(view.numbers).T
         aside = angular * self._half_track
         left, right = linear - aside, linear + aside
         fastest = np.maximum(np.abs(left), np.abs(right))
         is_fast = fastest > self._speed
         share = self._speed / np.where(is_fast, fastest, 1.0)
-        asked = self._asked.copy()
-        asked[:, 0, 0] = np.where(is_fast, left * share, left)
-        asked[:, 1, 0] = np.where(is_fast, right * share, right)
-        return asked
+        found = self._at_rest.copy()
+        found[:, 0, 0] = np.where(is_fast, left * share, left)
+        found[:, 1, 0] = np.where(is_fast, right * share, right)
+        return found
 
 
-class WheelSpeedsAsked(Rows):
-    """What the actuators `wheel_speeds` of robots that move by kinematics ask of their wheels."""
+class WheelSetPoints(Rows):
+    """The set-points of wheels by the actuators `wheel_speeds` of robots that move by kinematics."""
 
     def __init__(self, set_points: Sequence[Slot], wheels: Sequence[Wheels]) -> None:
         assert not any(its.motors for its in wheels), "wheels with motors are those of rigid robots"
         self._set_points = Columns([[slot] for slot in set_points])
-        self._asked = np.empty((len(wheels), 2, 2))
-        self._asked[:, :, 1] = np.array([its.acceleration for its in wheels])[:, None]
+        self._at_rest = np.empty((len(wheels), 2, 2))
+        self._at_rest[:, :, 1] = np.array([its.acceleration for its in wheels])[:, None]
 
     def command(self, view: View) -> Floats:
-        """Return what is asked, of shape (robots, 2, 2)."""
-        asked = self._asked.copy()
-        asked[:, :, 0] = self._set_points.read(view.numbers)
-        return asked
+        """Return the set-points, of shape (robots, 2, 2)."""
+        found = self._at_rest.copy()
+        found[:, :, 0] = self._set_points.read(view.numbers)
+        return found

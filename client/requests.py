@@ -20,7 +20,7 @@ Take = Callable[[str, str, bytes], Taken | None]
 """Makes a result of a message (a channel's key, a name, the payload); None for any other message."""
 
 
-def ask(
+def exchange(
     wire: Wire,
     inbox: Inbox,
     channel: Channel,
