@@ -78,7 +78,7 @@ class NodeCore:
         self._failed: FailedForm | None = None
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
-        self.is_watched = False
+        self.is_guarded = False
         """Whether forms that write to the frame otherwise than by their views are errors: a check sets this."""
         self.deployment: Deployment | None = None
         self.frame: Frame | None = None
@@ -227,7 +227,7 @@ class NodeCore:
         """The pure step, made once."""
         if self._stepper is None:
             assert self.deployment is not None and self.member.layout is not None
-            self._stepper = Stepper(self.deployment, self.member.layout, is_watched=self.is_watched)
+            self._stepper = Stepper(self.deployment, self.member.layout, is_guarded=self.is_guarded)
         return self._stepper
 
     def make_anew(self) -> None:

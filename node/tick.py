@@ -89,12 +89,12 @@ class _RigidIsland(NamedTuple):
 class Stepper:
     """The pure step of one deployment and layout: everything a tick needs but the engine."""
 
-    def __init__(self, deployment: Deployment, layout: Layout, *, is_watched: bool = False) -> None:
-        """`is_watched`: forms that write to the frame otherwise than by their views are errors."""
+    def __init__(self, deployment: Deployment, layout: Layout, *, is_guarded: bool = False) -> None:
+        """`is_guarded`: forms that write to the frame otherwise than by their views are errors."""
         self.deployment = deployment
         self.layout = layout
-        self.world = World(deployment, layout, is_watched=is_watched)
-        self._is_watched = is_watched
+        self.world = World(deployment, layout, is_guarded=is_guarded)
+        self._is_guarded = is_guarded
         self.substeps = deployment.substeps
         self.events = Schedule(deployment)
         self.rest = Rest(deployment, layout)
@@ -141,7 +141,7 @@ class Stepper:
         if self._due.robots is not robots and self._due.robots != robots:
             self._due = DueSensors(robots, self._sensors, self._switches)
         turn = self._due.at(tick, numbers, frame.values)
-        view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
+        view = SensingView(tick, ReadOnly(numbers) if self._is_guarded else numbers, frame.values)
         payloads = self._sensing.sample(turn.sensors, view, turn.whole, turn.rows)
         for at in turn.counters:
             view.written[at] = numbers[at] + 1.0

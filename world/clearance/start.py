@@ -1,6 +1,6 @@
 """Checks that robots which move by kinematics start outside of scenery, and of one another.
 
-A kit checks those of its own models. That takes geometry, so it is looked at when all single fields are right.
+A kit checks those of its own models. This takes geometry, so it is done when all single fields are valid.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from foosim.world.moving.upright import Upright, made_model, stands_upright, upr
 from foosim.world.spec import WorldSpec
 
 PLACED_BY = ("at", "path")
-"""Settings that say where a robot starts."""
+"""Settings with the start of a robot."""
 
 
 def start_findings(spec: WorldSpec) -> Iterator[Finding]:
@@ -53,7 +53,7 @@ def start_findings(spec: WorldSpec) -> Iterator[Finding]:
 
 
 def _placed(spec: WorldSpec, layout: Layout, entity: Entity) -> tuple[tuple[float, float, float], Upright]:
-    """Return where an entity starts (m), and its cylinder."""
+    """Return the start of an entity (m), and its cylinder."""
     model, numbers = made_model(spec, layout, entity), [0.0] * layout.size
     model.place(WritableView(0, numbers))
     at = entity.offsets["position"]

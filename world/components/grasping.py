@@ -1,4 +1,4 @@
-"""What a gripper may take: the free rigid objects of a layout, their sizes and masses, and how far away they are."""
+"""Objects for grippers: the free rigid objects of a layout, their sizes and masses, and their distances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an actuator remembers of its jobs, and what each command does to that: see `forms.jobs`."""
+"""The state of an actuator's jobs, and the effect of each command on it: see `forms.jobs`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ NOBODY: Final = 0.0
 FRESH: Final = 2.0
 """In `jobs_changed` until the tick's end: something has changed in this tick."""
 TOLD: Final = 1.0
-"""In `jobs_changed` of the frame behind it, in which sensors tell of it."""
+"""In `jobs_changed` of the next frame, in which sensors report the change."""
 
 
 class JobBook:
-    """The jobs of one actuator. All that it remembers is slots of that."""
+    """The jobs of one actuator. All state is in the actuator's slots."""
 
     def __init__(self, at: Mounting) -> None:
         self._rows = {name: row for row, name in enumerate(at.spec.senders_to(at.robot.name))}
@@ -44,8 +44,8 @@ class JobBook:
     def take(self, command: Any, view: WritableView, made: Actuator, carry_out: Callable[[Any], bool]) -> bool:
         """Take a command that `addressed` has returned: a plain one, a job or a cancellation; False: it is refused.
 
-        Each new one ends what runs. A job that the actuator refuses fails. A number that is not above the last one of
-        its sender is a repeat, and does nothing.
+        Each new one ends the job that runs. A job that the actuator refuses fails. A number up to the last one of its
+        sender is a repeat, and does nothing.
         """
         plain = msgspec.structs.replace(command, **{JOB: 0.0})
         if command.job == 0.0:
@@ -72,7 +72,7 @@ class JobBook:
         return False
 
     def _cancel(self, view: WritableView, row: int, number: float, made: Actuator) -> None:
-        """End the job of a sender; one that has not come yet never begins."""
+        """End the job of a sender; a job that arrives later never begins."""
         last = view.numbers[self._numbers.at + row]
         is_running = view.numbers[self._running.at] == row + 1.0
         if number < last or (number == last and not is_running):
