@@ -116,8 +116,8 @@ def write(layout: Layout, numbers: list[float], edit: Edit) -> None:
 
 
 def _jobs_known(entity: Entity, numbers: Sequence[float]) -> list[tuple[int, float]]:
-    """Return places and numbers of the jobs of a robot that comes or leaves: none of them begins again, and one that runs
-    has failed."""
+    """Return places and numbers of the jobs of a robot that comes or leaves: none of them begins again, and one that
+    runs has failed."""
     found: list[tuple[int, float]] = []
     for field, at in entity.offsets.items():
         if at < entity.split and field.endswith((f".{NUMBERS}", f".{STATES}")):

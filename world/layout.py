@@ -91,8 +91,8 @@ class Entity:
 
     @property
     def can_leave(self) -> bool:
-        """Whether it can be removed from the world and added to it: a solved entity with a place, except the lasting ones
-        of a kit."""
+        """Whether it can be removed from the world and added to it: a solved entity with a place, except the
+        lasting ones of a kit."""
         return ABSENT in self.offsets
 
     def is_absent(self, numbers: Sequence[float]) -> bool:

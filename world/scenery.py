@@ -1,6 +1,6 @@
 """Fixed things that a deployment puts into its world beside table or hall: boxes, cylinders, and meshes from files.
 
-This is their schema, and their conversion to shapes of the scene. A mesh's file is named by a path inside the deployment's
+This is their schema, and their conversion to shapes of the scene. A mesh's file is a path inside the deployment's
 asset folder; its digest is written beside it when a run is planned, so that the deployment's text alone identifies
 the world, on every machine.
 """

@@ -40,8 +40,8 @@ class Side:
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """The physics of rigid bodies: gravity (m/s2), the sides of surfaces by their names, the solver's iterations and error
-    reduction of contacts (`contact_erp`).
+    """The physics of rigid bodies: gravity (m/s2), the sides of surfaces by their names, the solver's iterations and
+    error reduction of contacts (`contact_erp`).
 
     `surfaces` and `between_free` are for engines of spheres alone: the pairs of a free body with each surface, and with
     another free body. `density` (kg/m3) and `viscosity` (Pa s) are those of the medium, 0 without one.

@@ -87,7 +87,7 @@ def valid(quantity: Quantity) -> str:
 
 
 def _field(label: str, name: str) -> str:
-    """Return the full name of a field: that of a rule begins with the rule's name, that of a model (no label) does not."""
+    """Return the full name of a field of a rule, or of a model, whose label is empty."""
     return f"{label}.{name}" if label else name
 
 
@@ -151,14 +151,14 @@ def _number(quantity: Quantity, value: object) -> float:
 
 
 def _of_component(
-    entity: Entity, label: str, slots_of: Callable[[str, float], Mapping[str, Sequence[float]]], name: str, number: float
+    entity: Entity, label: str, change: Callable[[str, float], Mapping[str, Sequence[float]]], name: str, number: float
 ) -> list[Set]:
     """Return the edits of a component's slots for a value: its own slots, else fields of the entity."""
     found = []
-    for slot, numbers in slots_of(name, number).items():
+    for slot, numbers in change(name, number).items():
         field = _field(label, slot) if _field(label, slot) in entity.offsets else slot
         if entity.counts.get(field) != len(numbers) or not all(map(isfinite, numbers)):
-            raise ContractError(slots_of, "finite numbers by slot, as many as each has", {slot: numbers})
+            raise ContractError(change, "finite numbers by slot, as many as each has", {slot: numbers})
         found.append(Set(entity.name, field, [*map(float, numbers)]))
     return found
 
