@@ -275,7 +275,7 @@ class NodeCore:
     def _publish_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
         """Publish the samples of these robots at a frame; return their sensors' new slots."""
         stepper = self.stepper
-        packets, remembered = stepper.sense(frame, robots)
+        packets, sensed = stepper.sense(frame, robots)
         for name in stepper.not_finite.keys() - self._not_finite:
             self._not_finite.add(name)
             self.actions.append(Log("warning", f"tick {frame.tick}: a reading of {name} is not finite and not sent"))
@@ -283,7 +283,7 @@ class NodeCore:
         payload = encode(Samples(frame.tick, frame.digest, self.name, names, packets))
         self._last_samples = frame.digest, names, payload
         self.actions.append(Publish(channels.SAMPLES, self.name, payload))
-        return remembered
+        return sensed
 
     def _begin(self) -> bool:
         """Steps 2 to 4: with order and deliveries, edit the frame and hand this node's share to the engine."""

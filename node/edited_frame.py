@@ -40,10 +40,10 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[list[flo
     return numbers, moved
 
 
-def kept(remembered: Mapping[int, float], moved: Iterable[Entity]) -> dict[int, float]:
+def kept(sensed: Mapping[int, float], moved: Iterable[Entity]) -> dict[int, float]:
     """Return the sensors' new slots of a frame, by place, without robots that came or left; counters continue."""
     gone = {at for robot in moved for at in {*range(robot.split, robot.stop)}.difference(counters(robot))}
-    return {at: number for at, number in remembered.items() if at not in gone}
+    return {at: number for at, number in sensed.items() if at not in gone}
 
 
 def _push(numbers: list[float], layout: Layout, push: Push, spec: WorldSpec) -> None:

@@ -26,7 +26,7 @@ from foosim.world.assembly.body_limits import BodyLimits
 from foosim.world.assembly.grippers import Gripper, grippers_of, release
 from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.assembly.rest import Rest, stop, wake_edited
-from foosim.world.assembly.standing import Standing
+from foosim.world.assembly.standing import UnmovedBodies
 from foosim.world.assembly.world import World
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
@@ -100,7 +100,7 @@ class Stepper:
         self.rest = Rest(deployment, layout)
         self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
-        self._standing = Standing(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
+        self._unmoved = UnmovedBodies(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
         self._alone: frozenset[int] = frozenset()
         """Bodies that are islands by themselves, of the last solved islands."""
         self._grippers: dict[int, list[Gripper]] = {}
@@ -156,7 +156,7 @@ class Stepper:
         return packets, view.written
 
     def edited(
-        self, frame: Frame, edits: Sequence[Edit], remembered: dict[int, float]
+        self, frame: Frame, edits: Sequence[Edit], sensed: dict[int, float]
     ) -> tuple[list[float], dict[int, float]]:
         """Return the numbers of the frame after the edits of order and events, and the rules of the world; and the
         new slots of sensors that are still present, by place."""
@@ -166,8 +166,8 @@ class Stepper:
         self.world.apply_rules(numbers, frame.tick)
         if edits or self.world.has_rules:
             wake_edited(frame, numbers, edits)
-            self._standing.wake_edited(frame, numbers)
-        return numbers, kept(remembered, moved) if moved else remembered
+            self._unmoved.wake_edited(frame, numbers)
+        return numbers, kept(sensed, moved) if moved else sensed
 
     @property
     def waits(self) -> bool:
@@ -246,7 +246,7 @@ class Stepper:
         world.apply_entity_rules(bodies, start, numbers, work.tick)
         world.judge_jobs(bodies, start, numbers, work.tick)
         if not self._by_island:
-            self._standing.note(bodies, numbers, before)
+            self._unmoved.note(bodies, numbers, before)
         if not (isfinite(sum(numbers)) and self._can_all_be(changed, before, work)):
             self._quarantine(work, before)
 
@@ -274,7 +274,7 @@ class Stepper:
                     _wait(entity, numbers)
             bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] <= 0.0]
         if not self._by_island:
-            bodies = self._standing.awake(bodies, self._alone, numbers, work.start or numbers)
+            bodies = self._unmoved.awake(bodies, self._alone, numbers, work.start or numbers)
         return bodies, is_partial
 
     def _solve_together(self, engine: Engine, bodies: Sequence[Entity], work: Work, start: Sequence[float]) -> None:
@@ -400,12 +400,12 @@ class Term:
         self._members: tuple[Groups, Groups] = ((), ())
 
     def work(
-        self, frame: Frame, edits: Sequence[Edit], packets: Sequence[Delivered], remembered: dict[int, float]
+        self, frame: Frame, edits: Sequence[Edit], packets: Sequence[Delivered], sensed: dict[int, float]
     ) -> tuple[Work, dict[int, float]]:
         """Edit the frame, deliver the packets, return the node's share of the tick, and the new slots of sensors that
         are still present, by place."""
         stepper = self.stepper
-        numbers, remembered = stepper.edited(frame, edits, remembered)
+        numbers, sensed = stepper.edited(frame, edits, sensed)
         is_edited = edits or frame.tick in stepper.events.by_tick or stepper.world.has_rules
         values = None if is_edited else frame.values
         share = self.assignment.shares(numbers, values)[self.node]
@@ -413,7 +413,7 @@ class Term:
         outboxes = stepper.deliver(packets, share.solved, numbers, frame.tick, start)
         islands, movers = self._groups(share)
         work = Work(frame.tick, frame.layout, islands, share.solved, numbers, outboxes, start, movers, values)
-        return work, remembered
+        return work, sensed
 
     def _groups(self, share: Share) -> tuple[Groups, Groups]:
         """Return the entities of a share's islands, and those in the way of each; a share is often the last one."""

@@ -117,7 +117,7 @@ NOTHING: Final = Carried({}, {})
 class Declared:
     """The part of a deployment in a layout.
 
-    `carried` are the slots that entities carry, by name; `memory` the slots of the world's rules for each entity of a
+    `carried` are the slots that entities carry, by name; `rule_slots` those of the world's rules for each entity of a
     model; `spares` the entities that are absent at the start, `lasting` the entities that never leave; `switched` the
     robots with components, which can be switched off; `fields` the fields of entities whose model has no fixed ones, by
     name; `variants` the descriptions of entities with a variant of their model, by name; `demanded` the fields on
@@ -125,7 +125,7 @@ class Declared:
     """
 
     carried: Mapping[str, Carried] = field(default_factory=dict)
-    memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    rule_slots: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     spares: frozenset[str] = frozenset()
     lasting: frozenset[str] = frozenset()
     switched: frozenset[str] = frozenset()
@@ -143,10 +143,10 @@ class Declared:
         more = self.demanded.get(name)
         return {**fields, **more} if more else fields
 
-    def remembered(self, kind: Model) -> dict[str, int]:
+    def slots_of_rules(self, kind: Model) -> dict[str, int]:
         """Return the slots of the world's rules for each entity of a model."""
-        of_robots = self.memory.get(ROBOTS, {}) if kind.is_robot else {}
-        return {**self.memory.get(kind.name, {}), **of_robots}
+        of_robots = self.rule_slots.get(ROBOTS, {}) if kind.is_robot else {}
+        return {**self.rule_slots.get(kind.name, {}), **of_robots}
 
 
 class Layout:
@@ -162,7 +162,7 @@ class Layout:
             start = position
             offsets: dict[str, int] = {}
             fields = declared.fields_of(name, kind)
-            counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
+            counts: dict[str, int] = {**fields, **declared.slots_of_rules(kind), **its.solver}
             if "position" in fields and kind.is_solved and name not in declared.lasting:
                 counts[ABSENT] = 1
             if name in declared.switched:
@@ -276,7 +276,7 @@ def build_layout(spec: WorldSpec) -> Layout:
         models |= {**kit.entities, **its}
         spares |= its.keys()
         lasting |= kit.entities.keys()
-    memory, of_world = _memory(spec)
+    rule_slots, of_world = _rule_slots(spec)
     if of_world:
         models[WORLD] = WORLD
     models |= {name: one.model for section in (spec.objects, spec.robots) for name, one in section.items()}
@@ -288,7 +288,7 @@ def build_layout(spec: WorldSpec) -> Layout:
     demanded = {name: found for name, robot in spec.robots.items() if (found := _demanded(robot))}
     switched = frozenset([name for name, robot in spec.robots.items() if switches_of(robot)])
     coming = frozenset(spares), frozenset(lasting), switched
-    return Layout(models, Declared(carried, memory, *coming, fields, kinds, demanded))
+    return Layout(models, Declared(carried, rule_slots, *coming, fields, kinds, demanded))
 
 
 def switches_of(robot: RobotSettings) -> dict[str, int]:
@@ -317,21 +317,21 @@ def _model(kind: str) -> Model:
     return WORLD_MODEL if kind == WORLD else registry.find_model(kind)
 
 
-def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]:
+def _rule_slots(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]:
     """Return the slots of a world's rules: for each entity, by its model; and for the world."""
     each: dict[str, dict[str, int]] = {}
     of_world: dict[str, int] = {}
     for label, settings in spec.world_rules.items():
         rule = settings.component_type
-        of_world |= _behind(label, rule.slots)
+        of_world |= _prefixed(label, rule.slots)
         for model, slots in rule.each.items():
-            each.setdefault(model, {}).update(_behind(label, slots))
+            each.setdefault(model, {}).update(_prefixed(label, slots))
     return each, of_world
 
 
 def of_motion(model: Model) -> dict[str, int]:
     """Return the slots of a model's motion."""
-    return {} if model.motion is None else _behind(MOTION, model.motion.slots)
+    return {} if model.motion is None else _prefixed(MOTION, model.motion.slots)
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,11 +358,11 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
         component = actuator.component_type
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
         if component.jobs:
-            slots |= _behind(label, job_slots(spec.senders_to(name)))
+            slots |= _prefixed(label, job_slots(spec.senders_to(name)))
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
-        slots = _behind(label, rule.component_type.slots_on(fields))
+        slots = _prefixed(label, rule.component_type.slots_on(fields))
         yield Declaring(f"rule {label}", (*place, "rules", label), slots)
     for label, sensor in sorted(robot.sensors.items()):
         component = sensor.component_type
@@ -415,7 +415,7 @@ def _slots_of_modifiers(
 
 
 def _slots(name: str, component: Component, settings: ComponentSettings, carrier: Carrier) -> dict[str, int]:
-    return _behind(name, component.slots_on(settings, carrier))
+    return _prefixed(name, component.slots_on(settings, carrier))
 
 
 def _kept(slots: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -424,7 +424,7 @@ def _kept(slots: Mapping[str, Any]) -> Mapping[str, Any]:
     return slots
 
 
-def _behind(name: str, slots: Mapping[str, int]) -> dict[str, int]:
+def _prefixed(name: str, slots: Mapping[str, int]) -> dict[str, int]:
     """Return the slots of a component by their names on an entity."""
     return {f"{name}.{slot}": count for slot, count in _kept(slots).items()}
 

@@ -58,8 +58,8 @@ class Schedule(NamedTuple):
 
     A reading is due at times t for which (t - offset) rate is whole. It is taken at the first tick not before, so at
     most a tick's length later: at tick k where floor((k T - offset) rate) is more than at tick k - 1, T being the tick.
-    The numbers are this inequality in integers, divided by what they have in common. With a period of n whole ticks
-    they are 1, -offset in ticks, n.
+    The numbers are this inequality in integers, divided by their greatest common divisor. With a period of n whole
+    ticks they are 1, -offset in ticks, n.
     """
 
     step: int

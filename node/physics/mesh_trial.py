@@ -125,7 +125,7 @@ def main() -> None:
     name, text, files = decode_any(tuple[str, str, dict[str, bytes]], sys.stdin.buffer.read())
     deployment = load_deployment(text, name).with_assets(files)
     bare = deployment.model_copy(update={"scenery": {}})
-    engine_of(bare, build_layout(deployment)).close()  # imports what it needs
+    engine_of(bare, build_layout(deployment)).close()  # for its imports
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_NOFILE, 0)
     _limit(resource.RLIMIT_AS, ADDRESS_SPACE_BYTES)

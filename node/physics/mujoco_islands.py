@@ -279,7 +279,7 @@ class CompositionEngine:
             qvel[v : v + 6] = *linear, *rotate((-x, -y, -z, w), spin)
         for placed, body in seats.fixed:
             if placed.fixed_at is not body:
-                self._stand(placed, body)
+                self._place_base(placed, body)
         for (number, origin, axes), grasp in zip(self._welds, seats.grasps, strict=True):
             self._weld(number, origin, axes, numbers[grasp : grasp + 7])
         if self._motors:
@@ -289,7 +289,7 @@ class CompositionEngine:
         self._warm.fill(0.0)
         self.d.time = 0.0
 
-    def _stand(self, placed: Placed, body: Body) -> None:
+    def _place_base(self, placed: Placed, body: Body) -> None:
         """Put the fixed base of a body of the same kind to the place of this one's."""
         x, y, z, w = body.orientation
         placed.fixed_at = body

@@ -156,7 +156,7 @@ def test_an_inertia_is_that_of_its_file_in_the_links_frame() -> None:
 
 def test_what_is_passed_over_is_noted_with_its_lines() -> None:
     (note,) = askew().notes
-    assert note.startswith("visual (line 11): what is seen of a robot are its collision shapes")
+    assert note.startswith("visual (line 11): a robot is drawn by its collision shapes")
     text = robot_text(more='<transmission name="t"/><gazebo><mu1>1</mu1></gazebo><gazebo/><dance/>')
     notes = read_urdf("a.urdf", {"a.urdf": text}).notes
     assert [note.partition(" (")[0] for note in notes] == ["dance", "gazebo", "transmission"]

@@ -16,7 +16,7 @@ from foosim.world.layout import Entity, Layout
 UNMOVED = "unmoved"
 
 
-class Standing:
+class UnmovedBodies:
     """The bodies of a layout that may stay unsolved: those with the slot, whose actuators are `steady`, without rules
     of their own."""
 

@@ -4,7 +4,7 @@ Quickhull (Barber, Dobkin, Huhdanpaa, The Quickhull Algorithm for Convex Hulls, 
 farthest outside. On which side of a plane a point lies is decided by whole numbers, of points on a grid of 2^20 steps,
 whose determinants fit int64: many points in one plane, as meshes have them, cannot mislead it. Where points are left
 outside of the greatest number of corners, the hull is scaled about its middle until it holds them, too. So it holds all
-points, to a few millionths of its length, which is what the grid leaves open.
+points, to a few millionths of its length, the resolution of the grid.
 """
 
 from __future__ import annotations

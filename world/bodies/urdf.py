@@ -30,7 +30,7 @@ NOTED: Final = {
     "safety_controller": "limits are the joint's",
     "calibration": "joints are where they are",
     "sensor": "sensors are the deployment's",
-    "visual": "what is seen of a robot are its collision shapes, in the colour of the first visual",
+    "visual": "a robot is drawn by its collision shapes, in the colour of the first visual",
     "self_collision_checking": "contacts are the engine's",
     "contact": "surfaces are the deployment's",
     "friction": "joints have damping alone",
@@ -197,7 +197,7 @@ def free_base_problem(robot: Robot) -> str:
     """Return why a robot cannot have a free base: one needs a mass; empty if it can."""
     if _base_mass(robot).mass > 0.0:
         return ""
-    return f"a free robot whose first link {robot.links[0].name}, with what is fixed to it, has no mass"
+    return f"a free robot whose first link {robot.links[0].name}, with all that is fixed to it, has no mass"
 
 
 def body_of(
@@ -250,7 +250,7 @@ def _base(robot: Robot) -> dict[int, tuple[Vector, Quaternion]]:
 
 
 def _base_mass(robot: Robot) -> MassOf:
-    """Return the mass of the first link with what is fixed to it, in its frame."""
+    """Return the mass of the first link with all that is fixed to it, in its frame."""
     parts = []
     for number, (position, orientation) in _base(robot).items():
         link = robot.links[number]

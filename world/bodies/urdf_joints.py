@@ -178,5 +178,5 @@ def _check_masses(file: str, tree: Sequence[tuple[LinkPart, JointPart | None]]) 
             moved[its.name] = moved.get(its.name, 0.0) + link.mass.mass
     for link, joint in tree:
         if joint is not None and joint.kind in MOVING and moved[joint.name] == 0.0:
-            what = f"the joint {joint.name} moves nothing: {link.name}, with what is fixed to it, has no mass"
+            what = f"the joint {joint.name} moves nothing: {link.name}, with all that is fixed to it, has no mass"
             raise AssetError(f"{file}:{link.line}: {what}; it needs an inertial")

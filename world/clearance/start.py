@@ -33,11 +33,11 @@ def start_findings(spec: WorldSpec) -> Iterator[Finding]:
     found: dict[int, str] = {}
     shapes = list(scenery_of(spec))
     standing = Standing([solid(shape) for shape in shapes], float(np.max(radius)))
-    who, what = standing.near(places[:, 0], places[:, 1])
+    rows, what = standing.near(places[:, 0], places[:, 1])
     solids = standing.solids.at(what)
-    depth = distance(*solids.beside(places[who, 0], places[who, 1]))
-    is_in = (depth < radius[who] + solids.radius) & (solids.low < top[who]) & (solids.high > bottom[who])
-    for row, number in zip(who[is_in].tolist(), what[is_in].tolist(), strict=True):
+    depth = distance(*solids.beside(places[rows, 0], places[rows, 1]))
+    is_in = (depth < radius[rows] + solids.radius) & (solids.low < top[rows]) & (solids.high > bottom[rows])
+    for row, number in zip(rows[is_in].tolist(), what[is_in].tolist(), strict=True):
         found.setdefault(row, f"the {shapes[number].name or 'scenery'}")
     one, other = pairs_near(places, places, 2.0 * float(np.max(radius)))
     dx, dy = places[other, 0] - places[one, 0], places[other, 1] - places[one, 1]

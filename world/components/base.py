@@ -53,7 +53,7 @@ class Sensor(Component):
     array (rays, 6), in m in the world frame."""
 
     def sample(self, view: WritableView) -> Any:
-        """Return what is measured: a value of the registered reading."""
+        """Return the measurement: a value of the registered reading."""
         return None
 
     def limits(self) -> Limits:
@@ -98,7 +98,7 @@ class Actuator(Component):
         return command
 
     def names(self) -> Sequence[str]:
-        """Return what the numbers of a command are called in messages; nothing: as their fields."""
+        """Return the names of a command's numbers in messages; empty: those of its fields."""
         return ()
 
     def problem(self, command: Any) -> str:
@@ -166,7 +166,7 @@ class Model(Component):
         """Put it somewhere (m, m/s, world frame): overridden by models whose settings have no place."""
 
     def derive(self, view: WritableView) -> None:
-        """Write the fields of a rigid model that follow from what the engine has computed, which is finite."""
+        """Write the fields of a rigid model that follow from the engine's result, which is finite."""
 
     def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
         """Whether its new, finite state is valid: inside its area, within its speed limit and its reach."""

@@ -44,7 +44,7 @@ class BeamsTogether(Rows):
         self._passed = np.array([one.entity.index for one in several], np.int64)
 
     def distances(self, view: View) -> Floats:
-        """Return how far it is from each mount to what its beams meet at the start of a tick (m): (sensors, beams).
+        """Return the distances from mounts to the first hits of their beams at a tick's start (m): (sensors, beams).
 
         It is inf where nothing is within a sensor's range.
         """

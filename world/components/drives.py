@@ -16,7 +16,7 @@ class Motor(NamedTuple):
     and by how much the force falls with the speed (N s/m or N m s/rad).
 
     The force is slope x (speed - actual speed), at most `force`: that of an electric motor at a voltage. Without a
-    slope it is that of an ideal servo, whatever reaches the speed within a substep.
+    slope it is that of an ideal servo: the force that reaches the speed within a substep.
     """
 
     speed: float
@@ -28,8 +28,8 @@ class Motor(NamedTuple):
 def share_of(slope: float, load: float, substep_s: float) -> float:
     """Return the share of the difference from its speed that a motor without another load takes away in a substep.
 
-    `load` is what it accelerates (kg, kg m2). It is the closed form of m dv/dt = b (v0 - v), 1 - exp(-b h / m), so that
-    a joint follows its exponential exactly, however steep the slope is.
+    `load` is the accelerated mass or inertia (kg, kg m2). The closed form of m dv/dt = b (v0 - v), 1 - exp(-b h / m),
+    follows the exponential exactly for any slope.
     """
     return 1.0 if slope == inf else 1.0 - exp(-slope * substep_s / load)
 

@@ -98,7 +98,7 @@ class BoundSensor:
         )
 
     def sample(self, view: WritableView) -> Any:
-        """Return what is measured. Raises ComponentError."""
+        """Return the measurement. Raises ComponentError."""
         try:
             reading = self.sensor.sample(view)
         except BaseException as error:
@@ -132,7 +132,7 @@ class BoundActuator:
     joints: tuple[int, ...] | None = None
     """The numbers of the joints whose motors it commands; None for all of them."""
     jobs: JobBook | None = None
-    """What it remembers of its jobs; None of one whose commands are none."""
+    """The state of its jobs; None of an actuator without jobs."""
 
     @property
     def has_waiting(self) -> bool:

@@ -14,7 +14,7 @@ from foosim.world.scene import Body, Quaternion, Vector, conjugate, moved, multi
 from foosim.world.spec import WorldSpec
 
 Grasp = tuple[Vector, Quaternion]
-"""The pose of what is held, its centre of mass in its principal axes, in the frame of the link that holds it."""
+"""The pose of the held entity, its centre of mass in its principal axes, in the frame of the link that holds it."""
 
 
 class Portable(NamedTuple):

@@ -13,7 +13,7 @@ from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.failures import ContractError
 from foosim.world.forms.jobs import CHANGED, JOB, NUMBER_MAX, NUMBERS, RUNNING, STATES, JobState
 
-NOBODY: Final = 0.0
+NO_JOB: Final = 0.0
 FRESH: Final = 2.0
 """In `jobs_changed` until the tick's end: something has changed in this tick."""
 TOLD: Final = 1.0
@@ -29,7 +29,7 @@ class JobBook:
         self._running, self._changed = at.slot(RUNNING), at.slot(CHANGED)
 
     def addressed(self, command: Any, source: str) -> Any | None:
-        """Return a command whose number says whose it is, too, so that modifiers may keep it for a later tick.
+        """Return a command whose number includes the sender, so that modifiers may keep it for a later tick.
 
         None of a job of a sender that the deployment does not let command the robot, or whose number is none.
         """
@@ -88,7 +88,7 @@ class JobBook:
         Without power it fails. An actuator whose job has failed holds.
         """
         numbers = view.numbers
-        if numbers[self._running.at] != NOBODY:
+        if numbers[self._running.at] != NO_JOB:
             state = made.progress(view) if has_power else JobState.FAILED
             if state not in (JobState.RUNNING, JobState.DONE, JobState.FAILED):
                 raise ContractError(made.progress, "JobState.RUNNING, DONE or FAILED", state)
@@ -106,14 +106,14 @@ class JobBook:
 
     def is_idle(self, view: View) -> bool:
         """Whether `judge` has nothing to do."""
-        return view.numbers[self._running.at] == NOBODY and view.numbers[self._changed.at] == 0.0
+        return view.numbers[self._running.at] == NO_JOB and view.numbers[self._changed.at] == 0.0
 
     def _end(self, view: WritableView, state: JobState) -> bool:
         """Let the job that runs end so; return whether one ran."""
         running = int(view.numbers[self._running.at])
         if running:
             row = running - 1
-            view.write(self._running, NOBODY)
+            view.write(self._running, NO_JOB)
             self._note(view, row, view.numbers[self._numbers.at + row], state)
         return running > 0
 

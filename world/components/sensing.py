@@ -1,6 +1,6 @@
 """The readings of many sensors in one frame: each by itself, or those of a class together, with the same bits.
 
-Sensors that are due at one tick are due together again, so what is put together is kept for each set of them.
+Sensors that are due at one tick are due together again, so their plan is kept for each set of them.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ GROUPS: Final = "groups"
 
 
 def _written(value: object) -> object:
-    """Refuse what is neither a quantity nor quantities by name."""
+    """Refuse a value other than a quantity or quantities by name."""
     values = [*value.values()] if isinstance(value, dict) else [value]
     if not values or not all(isinstance(one, str | int | float) and not isinstance(one, bool) for one in values):
         raise custom_error(BadValue("not a quantity, nor quantities by the names of fields", value))

@@ -40,7 +40,7 @@ class Caster:
         scenery = list(dict.fromkeys(shape.name for shape in scene.scenery))
         self.things = (*layout.names, *scenery)
         number = {name: len(layout.entities) + place for place, name in enumerate(scenery)}
-        standing: list[Part] = []
+        fixed: list[Part] = []
         moving: list[Part] = []
         self._free: list[tuple[Entity, Link]] = []
         self._jointed: list[tuple[Entity, Body]] = []
@@ -54,7 +54,7 @@ class Caster:
                 frame, parts = len(self._free), moving
                 self._free.append((entity, body.links[0]))
             else:
-                frame, parts = 0, standing
+                frame, parts = 0, fixed
             parts += _parts(body, entity, [frame] * len(poses), poses)
         frames = len(self._free)
         for entity, body in bodies:
@@ -63,17 +63,17 @@ class Caster:
                 numbers = list(range(frames, frames + len(body.links)))
                 moving += _parts(body, entity, numbers, [("", ORIGIN, UPRIGHT)] * len(numbers))
                 frames += len(body.links)
-        standing += [(shape, number[shape.name], 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
-        self._forms, self._moving = Forms([*standing, *moving], meshes), slice(len(standing), None)
+        fixed += [(shape, number[shape.name], 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
+        self._forms, self._moving = Forms([*fixed, *moving], meshes), slice(len(fixed), None)
         self._prepare_frames()
         still = np.array([ORIGIN]).T, np.array([UPRIGHT]).T
-        self._standing = Poses(self._forms, slice(len(standing)), *still).columns
-        boxes = np.array([_box_of(part) for part in standing]).reshape(-1, 2, 3).transpose(1, 2, 0)
+        self._fixed = Poses(self._forms, slice(len(fixed)), *still).columns
+        boxes = np.array([_box_of(part) for part in fixed]).reshape(-1, 2, 3).transpose(1, 2, 0)
         self._boxes = boxes[0] - MARGIN_M, boxes[1] + MARGIN_M
         self._near = SortedBoxes(*self._boxes)
-        self._is_small = len(standing) + len(moving) <= FEW
+        self._is_small = len(fixed) + len(moving) <= FEW
         self._key: bytes | None = None
-        self._placement = Placement(Placed(self._forms, self._standing, [self._near]))
+        self._placement = Placement(Placed(self._forms, self._fixed, [self._near]))
 
     def _prepare_frames(self) -> None:
         """Note the places of moving poses in a frame."""
@@ -113,7 +113,7 @@ class Caster:
             positions = np.concatenate((positions, np.array([position for _, position, _ in poses]).T), axis=1)
             orientations = np.concatenate((orientations, np.array([turned for _, _, turned in poses]).T), axis=1)
         moving = Poses(self._forms, self._moving, positions, orientations)
-        return Placed(self._forms, np.concatenate((self._standing, moving.columns), axis=1), self._boxes_with(moving))
+        return Placed(self._forms, np.concatenate((self._fixed, moving.columns), axis=1), self._boxes_with(moving))
 
     def _boxes_with(self, moving: Poses) -> list[SortedBoxes]:
         """Return the boxes around all shapes: those of fixed shapes are sorted once, where they are many."""

@@ -26,8 +26,8 @@ def occupied_by(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entit
 
 
 def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
-    made = layout.shared("uprights", spec, partial(_Standing, spec, layout))
-    assert isinstance(made, _Standing)
+    made = layout.shared("uprights", spec, partial(_Uprights, spec, layout))
+    assert isinstance(made, _Uprights)
     its = made.uprights.get(entity.index)
     if its is None:
         return ""
@@ -49,7 +49,7 @@ def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], enti
     return ""
 
 
-class _Standing:
+class _Uprights:
     """The entities of a layout that move by kinematics, by index, and the scenery."""
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
