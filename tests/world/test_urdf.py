@@ -381,7 +381,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "only a head": (b"<?xml version='1.0'?>\n<!-- -->\n", "3: the file ends here, without an element"),
     "zero byte": (b"<robot>\0</robot>", "1: no XML, not well-formed"),
     "not UTF-8": (b'<robot name="\xff"/>', "1: no XML, not well-formed"),
-    "no encoding": (b'<?xml version="1.0" encoding="utf-99"?><robot/>', "1: no XML, (unknown encoding|an encoding)"),
+    "no encoding": (b'<?xml version="1.0" encoding="utf-99"?><robot/>', "1: no XML, (unknown|an unsupported) encoding"),
     "wide encoding": (b'<?xml version="1.0" encoding="gbk"?><robot/>', "1: no XML, an unsupported encoding"),
     "two robots": (b"<robot/>\n<robot/>", "2: no XML, junk after document element"),
     "bomb": (BOMB, "2: a document type: it may define entities"),
@@ -469,7 +469,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "damping": (robot_text(joint=LIMIT + '<dynamics damping="-1"/>'), "3: damping of dynamics is not within 0"),
     "moves nothing": (
         robot_text().replace(MASS.encode(), b"", 2),
-        "2: the joint j moves nothing: b, with what is fixed to it",
+        "2: the joint j moves nothing: b, with all that is fixed to it",
     ),
     "no mass": (inertial(**UNIT).replace(b'\n<mass value="1"/>', b""), "2: an inertial without mass, 'c'"),
     "negative mass": (inertial("-1", **UNIT), "3: a mass of -1 kg, valid are 1e-06 to"),

@@ -234,7 +234,7 @@ class SensingView(WritableView):
 
 def check_write(slot: Slot, values: Sequence[float]) -> None:
     """Assert that a component may write these numbers to a slot."""
-    assert slot.is_own, f"it writes {slot.name}, a slot of others that its writes do not declare"
+    assert slot.is_own, f"it writes {slot.name}, neither its own slot nor declared in its writes"
     assert len(values) == slot.size, f"{len(values)} numbers for {slot.name}, which has {slot.size}"
     assert all(map(isfinite, values)), f"{', '.join(map(str, values))} for {slot.name}: numbers of a frame are finite"
 
