@@ -29,6 +29,9 @@ class Limited:
     def limits(self) -> dict[str, tuple[float, float]]:
         return self._limits
 
+    def names(self) -> tuple[str, ...]:
+        return ()
+
 
 @pytest.mark.parametrize("number", [nan, inf, -inf])
 def test_what_a_modifier_makes_infinite_is_refused(number: float) -> None:
