@@ -74,12 +74,12 @@ class NodeCore:
         self.refusals = Refusals(self.actions.append, lambda: self.deployment)
         self.work: Work | None = None
         self.failure = ""
-        """Why no run can continue here: a component has raised."""
+        """The error that ends the run here: a component has raised."""
         self._failed: FailedForm | None = None
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
-        self.is_watched = False
-        """Whether forms that write to the frame otherwise than by their views are errors: a check sets this."""
+        self.is_guarded = False
+        """Whether a form that writes to the frame without its view is an error: a check sets this."""
         self.deployment: Deployment | None = None
         self.frame: Frame | None = None
         self.epoch = 0
@@ -94,12 +94,12 @@ class NodeCore:
         self._parts: dict[int, list[Part]] = {}
         self._sent_parts: dict[int, bytes] = {}
         self._unsampled: set[int] = set()
-        """Ticks at which samples are wanted of frames that are not here."""
+        """Ticks of frames whose samples are requested and whose frame is missing here."""
         self._pending = PendingEpochMessages()
         self._remembered: dict[int, float] = {}
-        """What the sensors of this node remember of the present frame: numbers of the next one, by place."""
+        """The new slots of this node's sensors at the present frame: numbers of the next one, by place."""
         self._last_samples: tuple[bytes, list[str], bytes] = b"", [], b""
-        """The samples that were published last: the digest of their frame, whose they are, and the payload.
+        """The last published samples: the digest of their frame, their robots, and the payload.
 
         A request that is repeated while a sensor takes long is answered with them: the sensor measures once.
         """
@@ -123,10 +123,10 @@ class NodeCore:
             channels.END.name: self._on_end,
         }
 
-    # --- what the shell calls --------------------------------------------------------------------------------------
+    # --- calls of the shell ---------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message as it came; what does not fit is counted and dropped."""
+        """Take one message as it came; an invalid one is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
                 self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
@@ -161,7 +161,7 @@ class NodeCore:
         return self.ended is None and not self.failure
 
     def fail(self, error: ComponentError) -> None:
-        """A component has raised: compute no more, and have the run end, since the next owner would meet it, too."""
+        """A component has raised: compute no more, and end the run, since the next owner would meet it, too."""
         self.failure = sendable(str(error))[: limits.TEXT_LENGTH_MAX]
         self.work = None
         trace, self._failed = failed_form(error)
@@ -203,13 +203,13 @@ class NodeCore:
         self.member.ready()
 
     def wake(self, now_ns: int) -> None:
-        """Send what is due by time: hello, heartbeat, repeated requests."""
+        """Send the messages that are due by time: hello, heartbeat, repeated requests."""
         self.member.wake(now_ns, self._heartbeat)
         if self._is_in and self._retry.is_over(now_ns) and self.work is None:
-            self._ask_again(now_ns)
+            self._request_missing(now_ns)
 
     def deadline_ns(self) -> int:
-        """When `wake` has something to do next."""
+        """The time of the next work of `wake`."""
         return min(self.member.deadline_ns, self._retry.at_ns) if self._is_in else self.member.deadline_ns
 
     @property
@@ -224,14 +224,14 @@ class NodeCore:
 
     @property
     def stepper(self) -> Stepper:
-        """The pure step, made once."""
+        """The pure step, built once."""
         if self._stepper is None:
             assert self.deployment is not None and self.member.layout is not None
-            self._stepper = Stepper(self.deployment, self.member.layout, is_watched=self.is_watched)
+            self._stepper = Stepper(self.deployment, self.member.layout, is_guarded=self.is_guarded)
         return self._stepper
 
     def make_anew(self) -> None:
-        """Replace all objects that compute ticks by new ones: nothing that matters is lost."""
+        """Replace all objects that compute ticks by new ones: they keep no state."""
         self._stepper = None
         if self._term is not None:
             self._term = self._make_term()
@@ -253,7 +253,7 @@ class NodeCore:
 
     @property
     def waiting_for(self) -> str:
-        """What the current tick lacks, for people and for the supervisor."""
+        """The missing inputs of the current tick, in words, for logs and the supervisor."""
         if self.frame is None:
             return "epoch" if self.member.is_ready else "start"
         if self._barrier is not None:
@@ -273,20 +273,20 @@ class NodeCore:
         self._remembered = self._publish_samples(frame, term.mine)
 
     def _publish_samples(self, frame: Frame, robots: Sequence[Entity]) -> dict[int, float]:
-        """Publish what these robots send at a frame; return what their sensors remember."""
+        """Publish the samples of these robots at a frame; return their sensors' new slots."""
         stepper = self.stepper
-        packets, remembered = stepper.sense(frame, robots)
+        packets, sensed = stepper.sense(frame, robots)
         for name in stepper.not_finite.keys() - self._not_finite:
             self._not_finite.add(name)
-            self.actions.append(Log("warning", f"tick {frame.tick}: a reading of {name} is not finite, and not sent"))
+            self.actions.append(Log("warning", f"tick {frame.tick}: a reading of {name} is not finite and not sent"))
         names = [robot.name for robot in robots]
         payload = encode(Samples(frame.tick, frame.digest, self.name, names, packets))
         self._last_samples = frame.digest, names, payload
         self.actions.append(Publish(channels.SAMPLES, self.name, payload))
-        return remembered
+        return sensed
 
     def _begin(self) -> bool:
-        """Steps 2 to 4: with order and deliveries, edit the frame and hand my share to the engine."""
+        """Steps 2 to 4: with order and deliveries, edit the frame and hand this node's share to the engine."""
         frame = self.frame
         assert frame is not None and self._term is not None
         edits = self._inputs.edits(frame.tick)
@@ -391,7 +391,7 @@ class NodeCore:
             self._sample_again(want.tick)
 
     def _sample_again(self, tick: int) -> None:
-        """Log what my robots, also those that I had not at that tick, send at a frame; request a missing one."""
+        """Publish the samples of this node's present robots at a frame; request a missing frame."""
         frame = self._history.get(tick)
         if frame is not None:
             mine = [robot for robot in frame.layout.robots if self.owners.get(robot.name) == self.name]
@@ -405,8 +405,8 @@ class NodeCore:
             message = encode(Want(self.name, channels.COMMIT.name, tick, self.epoch, []))
             self.actions.append(Publish(channels.WANT, self.name, message))
 
-    def _ask_again(self, now_ns: int) -> None:
-        """Ask for whatever the current tick lacks, the wait doubling."""
+    def _request_missing(self, now_ns: int) -> None:
+        """Request the missing inputs of the current tick, the wait doubling."""
         tick = 0 if self.frame is None else self.frame.tick
         if self._awaited_epoch is not None:
             wants = [Want(self.name, channels.COMMIT.name, self._awaited_epoch.tick, self.epoch, [])]
@@ -462,7 +462,7 @@ class NodeCore:
     def _begin_anew(self, epoch: Epoch) -> None:
         """The other nodes continue without this one: its results are void, so it joins again."""
         if self.epoch == 0:
-            return  # it has not been in yet
+            return  # it was never a member
         self.actions.append(Log("warning", f"epoch {epoch.epoch} is without this node: it sends its hello again"))
         self.epoch = epoch.epoch
         self.frame = self._term = self._awaited_epoch = self.work = self._barrier = None
@@ -473,7 +473,7 @@ class NodeCore:
         self.member.begin_anew()
 
     def _on_commit(self, commit: Commit, payload: bytes, now_ns: int) -> None:
-        """The frame that the epoch starts from, when mine is not there or not the same; or one to sample."""
+        """The frame that the epoch starts from, where this node has none or another one; or one to sample."""
         if commit.tick in self._unsampled:
             self._take_old_frame(commit)
             return

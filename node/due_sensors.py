@@ -1,4 +1,4 @@
-"""Which sensors of a node's robots measure at a tick, and what their packets are called."""
+"""The sensors of a node's robots that measure at a tick, and the names of their packets."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from foosim.world.forms.forms import DOWN, INACTIVE
 from foosim.world.layout import Entity
 
 TURNS_MAX: Final = 64
-"""Sets of schedules whose turn is kept."""
+"""The count of sets of schedules with a kept turn."""
 Sensors: TypeAlias = tuple[BoundSensor, ...]
 
 
 class Turn(NamedTuple):
-    """Who measures at a tick: robots in service with their sensors, these one after the other, and their packets."""
+    """The measurements of a tick: robots in service with their sensors, these in a row, and their packets."""
 
     robots: tuple[tuple[Entity, Sensors], ...]
     sensors: Sensors
@@ -29,11 +29,11 @@ class Turn(NamedTuple):
     """The places of the numbers that count the samples."""
     whole: Sensors = ()
     rows: NDArray[np.intp] | None = None
-    """Those that were due were all robots in service, and which of them the sensors are; None where not all of a robot
-    in service is switched on."""
+    """The due robots among all, and the rows of their sensors; None where a component of a robot in service is switched
+    off."""
 
     def taken(self, is_there: NDArray[np.bool_]) -> Turn:
-        """Return that of some of the robots, with all of their sensors that are due."""
+        """Return the turn of some of the robots, with all of their due sensors."""
         robots, counts = is_there.tolist(), [len(its) for _, its in self.robots]
         measures = np.repeat(is_there, counts)
         chosen = measures.tolist()
@@ -50,8 +50,8 @@ class Turn(NamedTuple):
 class DueSensors:
     """The sensors of some robots of one layout.
 
-    Sensors that are due at one tick are due together again: what follows from who they are is kept while the same
-    robots are in service, and the same components active.
+    Sensors that are due at one tick are due together again: their turn is kept while the same robots are in service,
+    and the same components active.
     """
 
     def __init__(
@@ -66,21 +66,21 @@ class DueSensors:
         self._bits = [switches[robot.name] for robot in robots]
         self._down = [robot.offsets[DOWN] for robot in robots]
         self._inactive = [robot.offsets.get(INACTIVE, robot.offsets[DOWN]) for robot in robots]
-        """Of one without components its `down`, which is 0 when it is looked at."""
+        """Of a robot without components its `down`, which is 0 when it is read."""
         everyone = [one for its in self._sensors for one in its]
         self._triggers = [one.trigger_at for one in everyone if one.trigger_at >= 0]
         self._schedules = sorted({(one.step, one.shift, one.period) for one in everyone})
         self._due: dict[tuple[bool, ...], Turn] = {}
         """The sensors of all robots, in service or not."""
         self._turns: dict[tuple[bool, ...], Turn] = {}
-        """Of those who are in service now."""
+        """Of the robots in service."""
         self._states = np.array([self._down, self._inactive], np.intp)
-        """The places that say who is out of service, and what is switched off."""
+        """The places of the slots for robots out of service, and for switched-off components."""
         self._out = b""
-        """What they had when the turns were made."""
+        """Their numbers when the turns were built."""
 
     def at(self, tick: int, numbers: Sequence[float], values: NDArray[np.float64]) -> Turn:
-        """Return who measures at a tick, at whose start the numbers of the frame are these; `values` are the same."""
+        """Return the turn of a tick with these numbers of the frame at its start; `values` are the same."""
         value = numbers.__getitem__
         if any(map(value, self._triggers)):
             return self._turn(self._in_service(self._due_at(tick, numbers), numbers))
@@ -121,7 +121,7 @@ class DueSensors:
         return Turn(robots, sensors, heads, tuple([one.samples_at for one in sensors]))
 
     def _in_service(self, due: Sequence[Sensors], numbers: Sequence[float]) -> Iterator[tuple[Entity, Sensors]]:
-        """Yield the robots in service with those of these sensors that are switched on."""
+        """Yield the robots in service with their sensors that are switched on."""
         for robot, down, inactive, its, bits in zip(
             self.robots, self._down, self._inactive, due, self._bits, strict=True
         ):

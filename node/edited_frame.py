@@ -1,4 +1,4 @@
-"""How a frame is edited before it is solved. Pure, and evaluated by every node alike."""
+"""The edits of a frame before it is solved. Pure, and evaluated by every node alike."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from foosim.world.spec import WorldSpec
 
 
 def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[list[float], list[Entity]]:
-    """Return the numbers of the edited frame, and who came or left; the order's edits apply in their order."""
+    """Return the numbers of the edited frame, and the entities that came or left; edits apply in their order."""
     layout, numbers = frame.layout, frame.numbers.copy()
     moved = []
     for change in fitting_edits(layout, numbers, edits):
@@ -40,10 +40,10 @@ def edit(frame: Frame, edits: Sequence[Edit], spec: WorldSpec) -> tuple[list[flo
     return numbers, moved
 
 
-def kept(remembered: Mapping[int, float], moved: Iterable[Entity]) -> dict[int, float]:
-    """Return what sensors remember of a frame, by place, without robots that came or left; counters continue."""
+def kept(sensed: Mapping[int, float], moved: Iterable[Entity]) -> dict[int, float]:
+    """Return the sensors' new slots of a frame, by place, without robots that came or left; counters continue."""
     gone = {at for robot in moved for at in {*range(robot.split, robot.stop)}.difference(counters(robot))}
-    return {at: number for at, number in remembered.items() if at not in gone}
+    return {at: number for at, number in sensed.items() if at not in gone}
 
 
 def _push(numbers: list[float], layout: Layout, push: Push, spec: WorldSpec) -> None:
@@ -55,7 +55,7 @@ def _push(numbers: list[float], layout: Layout, push: Push, spec: WorldSpec) -> 
 
 
 def _hold(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Layout, robot: Entity, those: int) -> None:
-    """Have actuators that go out of service, or come back, hold a robot where it is: `those` are their bits."""
+    """Let actuators that go out of service, or come back, hold a robot at its place: `those` are their bits."""
     bits = switches_of(spec.robots[robot.name])
     for one in actuators_of(spec, layout, robot):
         if not bits[one.channel] & those:
@@ -64,5 +64,5 @@ def _hold(view: WritableView, numbers: list[float], spec: WorldSpec, layout: Lay
         if one.jobs is not None:
             one.jobs.drop(view)
         for field, at in robot.offsets.items():
-            if field.startswith(f"{one.channel}.") and field.count(".") > 1:  # a modifier's: what waits is out of date
+            if field.startswith(f"{one.channel}.") and field.count(".") > 1:  # of a modifier: outdated
                 numbers[at : at + robot.counts[field]] = [0.0] * robot.counts[field]

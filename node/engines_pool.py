@@ -33,12 +33,12 @@ class Solver:
         self._factory = factory
         self._engine: AnyEngine | None = None
         self.fingerprint = b""
-        """The digest of the fixed small run, empty before the engine is built, unless it was set."""
+        """The digest of the fixed small run, empty before the engine is built, or a preset one."""
 
     # --- building ----------------------------------------------------------------------------------------------------
 
     def build(self) -> None:
-        """Build the engine if it is wanted and not there, and report it to the core; it gives the fingerprint."""
+        """Build the engine if it is wanted and not there, and report it to the core; it returns the fingerprint."""
         core = self._core
         if self._engine is not None or core.layout is None or core.failure:
             return
@@ -52,7 +52,7 @@ class Solver:
             core.engine_ready(self.fingerprint)
 
     def rebuild(self) -> None:
-        """Replace the engine, and all that computes beside it, by new ones: nothing that matters is lost."""
+        """Replace the engine, and all that computes beside it, by new ones: they keep no state."""
         self.close()
         try:
             self._core.make_anew()
@@ -68,7 +68,7 @@ class Solver:
     # --- solving -----------------------------------------------------------------------------------------------------
 
     def solve(self, work: Work) -> None:
-        """Solve a tick's work and give it back to the core."""
+        """Solve a tick's work and return it to the core."""
         try:
             assert self._engine is not None
             self._core.stepper.solve(self._engine, work)
@@ -84,7 +84,7 @@ class Solver:
 
 
 def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
-    """Return the digest of a fixed small run: the stirred world without its spares, 32 ticks.
+    """Return the digest of a fixed small run: the excited world without its spares, 32 ticks.
 
     The meshes of the scenery, as they were read here, are part of it, and the version of an engine that has one.
     """
@@ -96,7 +96,7 @@ def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     for tick in range(FINGERPRINT_TICKS):
         work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
         stepper.solve(engine, work)
-    stepper.quarantined.clear()  # of a run that is none
+    stepper.quarantined.clear()  # of no run
     meshes = [shape.geometry.digest for shape in deployment.scenery_shapes() if isinstance(shape.geometry, Mesh)]
     version = getattr(engine, "version", "").encode()
     return blake2b(np.array(numbers).tobytes() + b"".join(meshes) + version, digest_size=32).digest()

@@ -15,7 +15,7 @@ from foosim.world.edits import Edit, check_edits
 
 
 class Inputs:
-    """Orders and deliveries of the last ticks and of those to come."""
+    """Orders and deliveries of the last and the next ticks."""
 
     def __init__(self) -> None:
         self._orders: dict[int, list[Edit]] = {}
@@ -24,14 +24,14 @@ class Inputs:
     def begin(self, epoch: Epoch) -> None:
         """A new epoch issues orders again. Deliveries stay true.
 
-        A node that was away for long has some of ticks that are not requested any more.
+        A node that was away for long drops those of ticks that no node requests any more.
         """
         self._orders.clear()
         oldest = epoch.tick - limits.KEPT_TICKS
         self._deliveries = {tick: kept for tick, kept in self._deliveries.items() if tick >= oldest}
 
     def take_order(self, order: Order, own_tick: int) -> bool:
-        """Take an order; False for a repeat. Raises `Malformed` for edits that none can carry out."""
+        """Take an order; False for a repeat. Raises `Malformed` for impossible edits."""
         last = order.tick + order.following
         if last < own_tick or last in self._orders:
             return False
@@ -53,11 +53,11 @@ class Inputs:
         return True
 
     def edits(self, tick: int) -> list[Edit] | None:
-        """Return what the order of a tick changes; None while it has not come."""
+        """Return the edits of a tick's order; None before it has come."""
         return self._orders.get(tick)
 
     def deliveries(self, tick: int) -> tuple[bytes, Deliveries] | None:
-        """Return the deliveries of a tick with their bytes; None while they have not come."""
+        """Return the deliveries of a tick with their bytes; None before they have come."""
         return self._deliveries.get(tick)
 
     def missing(self, tick: int) -> list[channels.Channel]:
@@ -66,13 +66,13 @@ class Inputs:
         return missing if tick in self._deliveries else [*missing, channels.DELIVERIES]
 
     def forget(self, tick: int) -> None:
-        """Drop the inputs of a tick that is not computed again."""
+        """Drop the inputs of a finished tick."""
         self._orders.pop(tick, None)
         self._deliveries.pop(tick, None)
 
 
 def check_near(tick: int, own_tick: int) -> None:
-    """Raise `Malformed` for a tick that no process can have reached."""
+    """Raise `Malformed` for a tick too far ahead of this node."""
     if tick > own_tick + limits.KEPT_TICKS:
         raise Malformed(f"tick {tick}, this node is at {own_tick}")
 

@@ -1,6 +1,6 @@
 """The process `foosim role node`: a node's core between the simulation plane and its physics engine.
 
-One address is all that it needs: deployment and models come with the handshake.
+It needs one address only: deployment and models come with the handshake.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class NodeShell:
         self._is_stopped = True
 
     def _turn(self, now_ns: int) -> None:
-        """Compute ticks as far as the inputs allow; a tick's first messages are published before it is solved."""
+        """Compute ticks up to the last complete inputs; a tick's first messages are published before it is solved."""
         core = self.core
         core.busy = self.role.busy
         self._shell.check(now_ns)
@@ -87,7 +87,7 @@ class NodeShell:
         self._solver.build()
 
     def _work(self, now_ns: int) -> bool:
-        """Solve the current tick, if there is one to be solved."""
+        """Solve the current tick, if there is one to solve."""
         work = self.core.work
         if work is None:
             return False

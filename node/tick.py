@@ -26,7 +26,7 @@ from foosim.world.assembly.body_limits import BodyLimits
 from foosim.world.assembly.grippers import Gripper, grippers_of, release
 from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.assembly.rest import Rest, stop, wake_edited
-from foosim.world.assembly.standing import Standing
+from foosim.world.assembly.standing import UnmovedBodies
 from foosim.world.assembly.world import World
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
@@ -42,24 +42,24 @@ from foosim.world.setting.scheduled import Schedule
 
 ECHO = "echo"
 RETRIES: Final = 3
-"""So often a body in quarantine is solved again, each time after `RETRY_NS`; then it stays out until it is put
-elsewhere or removed."""
+"""The count of times that a body in quarantine is solved again, each after `RETRY_NS`; then it stays out until it is
+put elsewhere or removed."""
 RETRY_NS: Final = 1_000_000_000
 ATTEMPTS: Final = 8
-"""The field `quarantined` is this many times the ticks that are left, plus how often the body has come into quarantine;
-minus that number, of a body that is solved again; 0 of one that never was."""
+"""The field `quarantined` is this times the ticks that are left, plus the count of times in quarantine; minus that
+count of a body that is solved again; 0 of one that never was there."""
 
 _outbox_decoder = msgspec.msgpack.Decoder(list[OutboxPacket])
 _outbox_encoder = msgspec.msgpack.Encoder()
 
 
 Groups: TypeAlias = tuple[tuple[Entity, ...], ...]
-"""Entities that a node solves together, or that are in the way of such."""
+"""Entities that a node solves together, or that are in their way."""
 
 
 @dataclass
 class Work:
-    """What the engine has to do for one tick. `numbers` is the edited frame and is written by `solve`.
+    """The work of an engine for one tick. `numbers` is the edited frame and is written by `solve`.
 
     `start` is the edited frame before packets were delivered, the same in all nodes; empty where none were. `values`
     are the same as an array, where nothing was edited. `movers` are those in the way of each island, for engines that
@@ -87,33 +87,33 @@ class _RigidIsland(NamedTuple):
 
 
 class Stepper:
-    """The pure step of one deployment and layout: everything a tick needs but the engine."""
+    """The pure step of one deployment and layout: all of a tick except the engine."""
 
-    def __init__(self, deployment: Deployment, layout: Layout, *, is_watched: bool = False) -> None:
-        """`is_watched`: forms that write to the frame otherwise than by their views are errors."""
+    def __init__(self, deployment: Deployment, layout: Layout, *, is_guarded: bool = False) -> None:
+        """`is_guarded`: a form that writes to the frame without its view is an error."""
         self.deployment = deployment
         self.layout = layout
-        self.world = World(deployment, layout, is_watched=is_watched)
-        self._is_watched = is_watched
+        self.world = World(deployment, layout, is_guarded=is_guarded)
+        self._is_guarded = is_guarded
         self.substeps = deployment.substeps
         self.events = Schedule(deployment)
         self.rest = Rest(deployment, layout)
         self._limits = BodyLimits(deployment, layout)
         self._by_island = layout.couples
-        self._standing = Standing(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
+        self._unmoved = UnmovedBodies(layout, self.world.actuators, self.world.ruled | self.world.having_jobs)
         self._alone: frozenset[int] = frozenset()
-        """Bodies that are islands by themselves, of the islands that were solved last."""
+        """Bodies that are islands by themselves, of the last solved islands."""
         self._grippers: dict[int, list[Gripper]] = {}
         """By the indices of their robots."""
         for one in grippers_of(deployment, layout):
             self._grippers.setdefault(one.robot, []).append(one)
         self._divided: tuple[Groups, list[_RigidIsland]] = (), []
-        """The islands of the last tick, and what is solved of them."""
+        """The islands of the last tick, and their solved entities."""
         self._rigid = frozenset(entity.index for entity in layout.entities if entity.is_rigid)
         self._islands: Groups | None = None
         self._bodies: list[Entity] = []
         self._quarantined: list[int] = []
-        """Of the islands that were solved last: who is in them, and the places that say who is in quarantine."""
+        """Of the last solved islands: their entities, and the places of the fields `quarantined`."""
         self._all_rigid = all(entity.is_rigid for entity in layout.entities if entity.is_solved)
         self._sensors = {robot.name: sensors_of(deployment, layout, robot) for robot in layout.robots}
         self._switches = {robot.name: switches_of(deployment.robots[robot.name]) for robot in layout.robots}
@@ -128,20 +128,20 @@ class Stepper:
         """Robots and those of their actuators whose commands may wait for their tick."""
         self.sampling = Sampling(deployment)
         self.not_finite: Counter[str] = Counter()
-        """Readings with a number that is not finite, which are not sent, by robot and channel."""
+        """Robot and channel of unsent readings with a non-finite number."""
         self.quarantined: list[str] = []
-        """Who came into quarantine, and why, in words; the reader empties it."""
+        """The entities that came into quarantine, with the reasons, in words; the reader empties it."""
 
     def sense(self, frame: Frame, robots: Sequence[Entity]) -> tuple[list[RobotPacket], dict[int, float]]:
-        """Return what these robots send at the frame's tick, and what their sensors remember.
+        """Return the packets of these robots at the frame's tick, and their sensors' new slots.
 
-        That is numbers of the next frame, by place. Raises ComponentError.
+        The latter are numbers of the next frame, by place. Raises ComponentError.
         """
         tick, numbers = frame.tick, frame.numbers
         if self._due.robots is not robots and self._due.robots != robots:
             self._due = DueSensors(robots, self._sensors, self._switches)
         turn = self._due.at(tick, numbers, frame.values)
-        view = SensingView(tick, ReadOnly(numbers) if self._is_watched else numbers, frame.values)
+        view = SensingView(tick, ReadOnly(numbers) if self._is_guarded else numbers, frame.values)
         payloads = self._sensing.sample(turn.sensors, view, turn.whole, turn.rows)
         for at in turn.counters:
             view.written[at] = numbers[at] + 1.0
@@ -156,18 +156,18 @@ class Stepper:
         return packets, view.written
 
     def edited(
-        self, frame: Frame, edits: Sequence[Edit], remembered: dict[int, float]
+        self, frame: Frame, edits: Sequence[Edit], sensed: dict[int, float]
     ) -> tuple[list[float], dict[int, float]]:
-        """Return the numbers of the frame after the edits of order and events, and the rules of the world; and what
-        sensors that are still there remember of it, by place."""
+        """Return the numbers of the frame after the edits of order and events, and the rules of the world; and the
+        new slots of sensors that are still present, by place."""
         if frame.tick in self.events.by_tick:
             edits = [*edits, *self.events.edits(frame.tick, frame, edits)]
         numbers, moved = edit(frame, edits, self.deployment)
         self.world.apply_rules(numbers, frame.tick)
         if edits or self.world.has_rules:
             wake_edited(frame, numbers, edits)
-            self._standing.wake_edited(frame, numbers)
-        return numbers, kept(remembered, moved) if moved else remembered
+            self._unmoved.wake_edited(frame, numbers)
+        return numbers, kept(sensed, moved) if moved else sensed
 
     @property
     def waits(self) -> bool:
@@ -182,9 +182,9 @@ class Stepper:
         tick: int,
         start: Sequence[float] | None = None,
     ) -> dict[int, bytes]:
-        """Apply what reached these robots, in order; return the outboxes that it filled.
+        """Apply the packets that reached these robots, in order; return the filled outboxes.
 
-        `start` is a copy of the numbers as they are before; None: it is made here.
+        `start` is a copy of the numbers before; None: it is built here.
         """
         if not packets and not self._waiting:
             return {}
@@ -246,19 +246,19 @@ class Stepper:
         world.apply_entity_rules(bodies, start, numbers, work.tick)
         world.judge_jobs(bodies, start, numbers, work.tick)
         if not self._by_island:
-            self._standing.note(bodies, numbers, before)
+            self._unmoved.note(bodies, numbers, before)
         if not (isfinite(sum(numbers)) and self._can_all_be(changed, before, work)):
             self._quarantine(work, before)
 
     def _can_all_be(self, entities: Sequence[Entity], before: Sequence[float], work: Work) -> bool:
-        """Whether the new, finite states of these entities can be."""
+        """Whether the new, finite states of these entities are valid."""
         numbers = work.numbers
         if not self.world.are_plausible(entities, numbers, before, work.tick):
             return not any(self._problem(entity, before, work) for entity in entities)
         return not self._limits or not any(self._limits.problem(entity, numbers, before) for entity in entities)
 
     def _awake(self, work: Work) -> tuple[Sequence[Entity], bool]:
-        """Return what is solved, neither what stands nor what is in quarantine, and whether anything is in that."""
+        """Return the entities to solve, without unmoved and quarantined ones, and whether some are in quarantine."""
         numbers = work.numbers
         if work.islands is not self._islands:
             self._islands = work.islands
@@ -274,7 +274,7 @@ class Stepper:
                     _wait(entity, numbers)
             bodies = [entity for entity in bodies if numbers[entity.offsets["quarantined"]] <= 0.0]
         if not self._by_island:
-            bodies = self._standing.awake(bodies, self._alone, numbers, work.start or numbers)
+            bodies = self._unmoved.awake(bodies, self._alone, numbers, work.start or numbers)
         return bodies, is_partial
 
     def _solve_together(self, engine: Engine, bodies: Sequence[Entity], work: Work, start: Sequence[float]) -> None:
@@ -295,9 +295,9 @@ class Stepper:
     def _solve_islands(
         self, engine: IslandEngine, work: Work, start: Sequence[float], *, is_partial: bool
     ) -> list[Entity]:
-        """Solve the rigid bodies of one island after the other; those at rest are left as they are.
+        """Solve the rigid bodies of one island after the other; bodies at rest are kept.
 
-        `is_partial` says that some are in quarantine. Returns those that were solved.
+        `is_partial`: some are in quarantine. Returns the solved bodies.
         """
         numbers, world, rest = work.numbers, self.world, self.rest
         view = View(work.tick, numbers, start=start)
@@ -336,10 +336,10 @@ class Stepper:
         return found
 
     def _quarantine(self, work: Work, before: list[float]) -> None:
-        """An island with a result that cannot be keeps its edited state; the bad entities stop, and are marked.
+        """Let an island with an invalid result keep its edited state; the bad entities stop, and are marked.
 
-        Who was in quarantine before was copied: its state, which may be as bad as ever, says nothing of the others. A
-        body is solved again after `RETRY_NS`, at most `RETRIES` times.
+        An entity in quarantine was copied before: its state, maybe still invalid, has no effect on the others. A body
+        is solved again after `RETRY_NS`, at most `RETRIES` times.
         """
         numbers = work.numbers
         for island in work.islands:
@@ -361,8 +361,8 @@ class Stepper:
                 self.quarantined.append(f"tick {work.tick}: {entity.name} is in quarantine {until}: {why}")
 
     def _hold(self, entity: Entity, numbers: list[float]) -> str:
-        """Mark an entity, and return in words until when it is not solved. Where joints do not couple, a rule of the
-        world says what comes of it."""
+        """Mark an entity, and return in words until when it is not solved. Where joints do not couple, a rule of
+        the world decides."""
         at = entity.offsets["quarantined"]
         if entity.index not in self._limits:
             numbers[at] = 1.0
@@ -376,17 +376,17 @@ class Stepper:
         return f"for 1 s, then it is solved again ({attempt:.0f} of {RETRIES})"
 
     def _problem(self, entity: Entity, before: Sequence[float], work: Work) -> str:
-        """Return in words why an entity's new, finite state cannot be; empty where it can."""
+        """Return in words why an entity's new, finite state is invalid; empty for a valid one."""
         numbers = work.numbers
         return self._limits.problem(entity, numbers, before) or self.world.problem(entity, numbers, before, work.tick)
 
     def _what_is_bad(self, entity: Entity, before: Sequence[float], work: Work) -> str:
-        """Return in words why an entity's new state cannot be; empty where it can."""
+        """Return in words why an entity's new state is invalid; empty for a valid one."""
         return _not_finite(entity, work.numbers) or self._problem(entity, before, work)
 
 
 class Term:
-    """What one node computes of each tick, with the roster and the owners of an epoch."""
+    """The part of one node in each tick, with the roster and the owners of an epoch."""
 
     def __init__(self, stepper: Stepper, node: str, roster: Sequence[str], owners: Mapping[str, str]) -> None:
         """`roster` has the nodes in name order, `owners` the node of each robot."""
@@ -400,12 +400,12 @@ class Term:
         self._members: tuple[Groups, Groups] = ((), ())
 
     def work(
-        self, frame: Frame, edits: Sequence[Edit], packets: Sequence[Delivered], remembered: dict[int, float]
+        self, frame: Frame, edits: Sequence[Edit], packets: Sequence[Delivered], sensed: dict[int, float]
     ) -> tuple[Work, dict[int, float]]:
-        """Edit the frame, deliver the packets, and return the node's share of the tick; and what the sensors that are
-        still present remember of the frame, by place."""
+        """Edit the frame, deliver the packets, return the node's share of the tick, and the new slots of sensors that
+        are still present, by place."""
         stepper = self.stepper
-        numbers, remembered = stepper.edited(frame, edits, remembered)
+        numbers, sensed = stepper.edited(frame, edits, sensed)
         is_edited = edits or frame.tick in stepper.events.by_tick or stepper.world.has_rules
         values = None if is_edited else frame.values
         share = self.assignment.shares(numbers, values)[self.node]
@@ -413,7 +413,7 @@ class Term:
         outboxes = stepper.deliver(packets, share.solved, numbers, frame.tick, start)
         islands, movers = self._groups(share)
         work = Work(frame.tick, frame.layout, islands, share.solved, numbers, outboxes, start, movers, values)
-        return work, remembered
+        return work, sensed
 
     def _groups(self, share: Share) -> tuple[Groups, Groups]:
         """Return the entities of a share's islands, and those in the way of each; a share is often the last one."""
@@ -428,7 +428,7 @@ class Term:
 
 
 def _welds(grippers: Sequence[Gripper], bodies: Sequence[Entity], numbers: Sequence[float]) -> tuple[Weld, ...]:
-    """Return which of these bodies hold which."""
+    """Return the welds between these bodies: holders and held."""
     holding = [one for one in grippers if numbers[one.held] >= 0.0]
     if not holding:
         return ()
@@ -443,7 +443,7 @@ def _welds(grippers: Sequence[Gripper], bodies: Sequence[Entity], numbers: Seque
 
 
 def _not_finite(entity: Entity, numbers: Sequence[float]) -> str:
-    """Return in words the first field of an entity's state with a number that is not finite; empty without one."""
+    """Return in words the first field of an entity's state with a non-finite number; empty without one."""
     for field_name, at in entity.offsets.items():
         values = numbers[at : at + entity.counts[field_name]]
         if at < entity.split and not all(map(isfinite, values)):
@@ -460,7 +460,7 @@ def _wait(entity: Entity, numbers: list[float]) -> None:
 
 
 def _clear_results(entity: Entity, numbers: list[float]) -> None:
-    """Empty the contact logs and the efforts of a body that was not solved: they are those of one tick."""
+    """Empty the contact logs and the efforts of an unsolved body: they are those of one tick."""
     start = entity.offsets.get("contacts")
     if start is not None:
         numbers[start : start + 3] = (0.0, 0.0, -1.0)
@@ -473,7 +473,7 @@ def _clear_results(entity: Entity, numbers: list[float]) -> None:
 
 
 def _packets(turn: Turn, payloads: Iterable[bytes | None], outboxes: Mapping[int, bytes]) -> Iterator[RobotPacket]:
-    """Yield what robots send: their readings without those that were dropped, and what waited in their outboxes."""
+    """Yield the packets of robots: their readings except dropped ones, and the packets of their outboxes."""
     readings = iter(payloads)
     for robot, sensors in turn.robots:
         found = [(one.channel, "", payload) for one in sensors if (payload := next(readings)) is not None]

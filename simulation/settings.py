@@ -126,7 +126,7 @@ class Settings:
     supervisor: type[SupervisorCore] = SupervisorCore
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
-    is_watched: bool = False
+    is_guarded: bool = False
     """Whether forms that write to the frame otherwise than by their views are errors."""
     keeps_journals: bool = False
     """Whether the supervisor's journal is kept, so that it can be restarted."""

@@ -136,7 +136,7 @@ class System:
     def _enter_node(self, name: str, fingerprint: bytes) -> None:
         self._boots += 1
         core = self.settings.node(name, f"boot-{self._boots}", fingerprint, self.now_of(name))
-        core.is_watched = self.settings.is_watched
+        core.is_guarded = self.settings.is_guarded
         solver = self.solvers[name] = Solver(core, self.settings.factory)
 
         def turn(now_ns: int) -> None:

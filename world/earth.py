@@ -1,4 +1,4 @@
-"""Where a world lies on Earth: places in its frame of reference as latitude, longitude and altitude, and back.
+"""A world's place on Earth: places in its frame of reference as latitude, longitude and altitude, and back.
 
 The ellipsoid is that of WGS 84 (NGA.STND.0036, 2014). Angles are in rad; altitudes are in m above the ellipsoid.
 """
@@ -29,7 +29,7 @@ Bearing = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 
 
 class EarthOrigin(SpecBase):
-    """Where the world's origin lies on Earth (WGS 84), and where its x axis points: `heading`, clockwise from north.
+    """The world's origin on Earth (WGS 84), and the direction of its x axis: `heading`, clockwise from north.
 
     The world's z is up at the origin. With the usual heading of 90 deg x is east and y is north.
     """

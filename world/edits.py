@@ -1,4 +1,4 @@
-"""The edits of an order: what adds, removes, pushes and sets, and what they write. Pure."""
+"""The edits of an order: adding, removing, pushing, setting, and the numbers that they write. Pure."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ FIELD_MAX: Final = 3 * limits.NAME_LENGTH_MAX
 PARKED_Z_M: Final = -1e6
 PARKED_APART_M: Final = 100.0
 PARKED_MAX: Final = 1 << 16
-"""What is absent is so far below the world that nothing that looks at places finds it, and where its name says: in
-any company at one place, and hardly ever two at the same."""
+"""An absent entity is so far below the world that no component finds it there, at a place by its name: the same in any
+world, and rarely that of another entity."""
 
 
 class Add(Message, frozen=True):
@@ -58,7 +58,7 @@ class Set(Message, frozen=True):
 
 
 class Disrupt(Message, frozen=True):
-    """Do to the network what `event` (JSON as in a deployment, without a time) says: order k's, from frame k+1 on."""
+    """Apply `event` (JSON as in a deployment, without a time) to the network: that of order k from frame k+1 on."""
 
     event: Annotated[str, Meta(max_length=limits.EVENT_BYTES_MAX)]
 
@@ -68,11 +68,11 @@ Edits = Annotated[list[Edit], Meta(max_length=limits.ENTITIES_MAX)]
 
 
 def fitting_edits(layout: Layout, numbers: Sequence[float], edits: Iterable[Edit]) -> Iterator[Edit]:
-    """Yield the edits that do something to a frame with these numbers, in their order: each is fitting to what those
-    before it have left, if the caller applies them one after the other.
+    """Yield the edits with an effect on a frame with these numbers, in their order: each fits the numbers after the
+    earlier ones, if the caller applies them one after the other.
 
-    What is present is not added, nothing else is done to what is absent; a push of what is no free body, and a field
-    that an entity has not, or not of so many numbers, change nothing; what happens to the network is the vHub's.
+    No effect have: adding a present entity, any other edit of an absent one, pushing another entity than a free body,
+    setting an unknown field or another count of numbers. Events of the network are the vHub's.
     """
     for edit in edits:
         if isinstance(edit, Disrupt) or edit.name not in layout:
@@ -93,7 +93,7 @@ def fitting_edits(layout: Layout, numbers: Sequence[float], edits: Iterable[Edit
 
 
 def written(layout: Layout, numbers: Sequence[float], edits: Iterable[Edit]) -> list[float]:
-    """Return the numbers of a frame after edits, but for pushes and for what follows from an edit elsewhere."""
+    """Return the numbers of a frame after edits, without pushes and without effects of an edit on other entities."""
     found = [*numbers]
     for edit in fitting_edits(layout, found, edits):
         write(layout, found, edit)
@@ -101,7 +101,7 @@ def written(layout: Layout, numbers: Sequence[float], edits: Iterable[Edit]) -> 
 
 
 def write(layout: Layout, numbers: list[float], edit: Edit) -> None:
-    """Write what a fitting edit says of its entity's own numbers."""
+    """Write the numbers of a fitting edit to its entity's own slots."""
     if isinstance(edit, Disrupt | Push):
         return
     entity = layout[edit.name]
@@ -116,8 +116,8 @@ def write(layout: Layout, numbers: list[float], edit: Edit) -> None:
 
 
 def _jobs_known(entity: Entity, numbers: Sequence[float]) -> list[tuple[int, float]]:
-    """Return places and numbers of the jobs that a robot has known which comes or leaves: none of them begins again,
-    and one that runs has failed."""
+    """Return places and numbers of the jobs of a robot that comes or leaves: none of them begins again, and one that
+    runs has failed."""
     found: list[tuple[int, float]] = []
     for field, at in entity.offsets.items():
         if at < entity.split and field.endswith((f".{NUMBERS}", f".{STATES}")):
@@ -153,7 +153,7 @@ def parked(layout: Layout, entity: Entity) -> list[float]:
 
 
 def check_edits(edits: Sequence[Edit]) -> None:
-    """Raise `Malformed` for an edit with a number that is not finite: it would spoil a frame."""
+    """Raise `Malformed` for an edit with a non-finite number: it would spoil a frame."""
     for change in edits:
         numbers: tuple[float, ...] = ()
         if isinstance(change, Push):
@@ -161,4 +161,4 @@ def check_edits(edits: Sequence[Edit]) -> None:
         elif isinstance(change, Add | Set):
             numbers = tuple(change.numbers)
         if not all(isfinite(number) for number in numbers):
-            raise Malformed(f"{type(change).__name__} with numbers that are not finite: {numbers}")
+            raise Malformed(f"{type(change).__name__} with non-finite numbers: {numbers}")

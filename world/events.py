@@ -1,4 +1,4 @@
-"""Events of a world in a deployment: what is set, added and removed at a time, or at one that is drawn."""
+"""Events of a world in a deployment: fields set, entities added and removed at a given or drawn time."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class WorldEvent(SpecBase):
     """Sets fields of entities (`foosim set`), adds or removes them, at the first tick not before a time.
 
     The time is `at`, or drawn for each entity from those `between` two. The entities are all that `entity` matches, or
-    as many as `choose` says of them (`2 of rover-*`). Draws follow from the seed and the place in the list. `add` is
-    where it is added: a pose, or `true` where the deployment has it. What is present is not added, what is absent is
-    neither set nor removed. A pose is set whatever is there: bodies that overlap are pushed apart.
+    a drawn number of them by `choose` (`2 of rover-*`). Draws follow from the seed and the place in the list. `add` is
+    a pose, or `true` for the place in the deployment. A present entity is not added, an absent one neither set nor
+    removed. A pose is set without a check of its place: bodies that overlap are pushed apart.
     """
 
     at_ns: Time | None = Field(default=None, alias="at")
@@ -74,7 +74,7 @@ class WorldEvent(SpecBase):
 
     @property
     def chosen(self) -> tuple[int | None, str]:
-        """How many entities are drawn (None: all), and what their names match."""
+        """The count of drawn entities (None: all), and the pattern of their names."""
         if self.choose is None:
             assert self.entity is not None, "checked with the fields"
             return None, self.entity

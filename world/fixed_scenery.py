@@ -1,4 +1,4 @@
-"""The scenery that the kits and the scene of a deployment bring."""
+"""The scenery of a deployment's kits and scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from foosim.world.spec import WorldSpec
 
 
 def kits_of(spec: WorldSpec) -> Iterator[tuple[str, Any]]:
-    """Yield the kits of a world, made from their sections, by name in name order."""
+    """Yield the kits of a world, by name in name order."""
     for name, section in sorted(spec.kits.items()):
         yield name, spec.kit_types[name].factory(section, spec)
 

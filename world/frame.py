@@ -1,7 +1,7 @@
 """The frame: the complete state of the world at a tick boundary, and its digest.
 
-A frame is float64 numbers in the layout's order and the bounded outboxes of its robots. Nothing that matters lives
-elsewhere. Frames are values: what changes one makes another.
+A frame is float64 numbers in the layout's order and the bounded outboxes of its robots. All state of the world
+is in it. Frames are values: a change returns another one.
 """
 
 from __future__ import annotations
@@ -38,10 +38,7 @@ class Frame:
         *,
         numbers: list[float] | None = None,
     ) -> None:
-        """Without `values`, the frame is of these `numbers`, which are then nobody else's.
-
-        Of both, what is not given is made when it is first asked for.
-        """
+        """Without `values`, the frame owns these `numbers`. Either is built from the other at its first use."""
         self.tick = tick
         self.layout = layout
         self._values: NDArray[np.float64] | None = None
@@ -58,13 +55,13 @@ class Frame:
             self.take(values)
 
     def take(self, values: NDArray[np.float64]) -> None:
-        """Be of other values from here on, wherever it is kept: what a fault in a process's memory does."""
+        """Replace the values in place: the effect of a fault in a process's memory, for tests."""
         values.setflags(write=False)  # forms get it
         self._values, self._numbers, self._digest = values, None, b""
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """The values as an array that nobody may write to."""
+        """The values as a read-only array."""
         if self._values is None:
             self._values = np.array(self._numbers)
             self._values.setflags(write=False)
@@ -72,7 +69,7 @@ class Frame:
 
     @property
     def numbers(self) -> list[float]:
-        """The values as Python floats; whoever edits copies the list first."""
+        """The values as Python floats; the caller copies the list before an edit."""
         if self._numbers is None:
             self._numbers = self.values.tolist()
         return self._numbers

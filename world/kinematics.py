@@ -1,4 +1,4 @@
-"""Where the links of a body are, and how fast, from the numbers of a frame."""
+"""Poses and velocities of a body's links from the numbers of a frame."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ CENTRE_OF_SLOT: Final[Mapping[str, str]] = MappingProxyType(
         "linear_velocity": "centre_of_mass_velocity",
     }
 )
-"""What people call the slots of a free body that have the pose (centre of mass, principal axes) and the velocity of its
-first link's centre of mass: by their own names they know those of the link's origin and frame."""
+"""Displayed names of the slots of a free body with the pose (centre of mass, principal axes) and the velocity of its
+first link's centre of mass: their own names are displayed for the link's origin and frame."""
 
 
 def forward_kinematics(body: Body, entity: Entity, numbers: Sequence[float]) -> list[Pose]:
@@ -82,14 +82,14 @@ def velocity(body: Body, entity: Entity, numbers: Sequence[float]) -> Vector:
 
 
 class Twist(NamedTuple):
-    """How fast a place moves (m/s), and how fast what it is fixed to turns (rad/s): in the world frame."""
+    """The velocity of a place (m/s), and the angular velocity of its link (rad/s): in the world frame."""
 
     linear: Vector
     angular: Vector
 
 
 def twist(body: Body, entity: Entity, numbers: Sequence[float], index: int, place: Vector | None = None) -> Twist:
-    """Return how a place (m, world frame) moves that is fixed to the link of this index: by default its origin."""
+    """Return the motion of a place (m, world frame) fixed to the link of this index: by default its origin."""
     poses = forward_kinematics(body, entity, numbers)
     speeds = entity.offsets.get("joint_velocities", 0)
     of_joint: dict[int, float] = {}
@@ -116,7 +116,7 @@ def twist(body: Body, entity: Entity, numbers: Sequence[float], index: int, plac
 
 
 def _free_twist(entity: Entity, numbers: Sequence[float], place: Vector) -> Twist:
-    """Return how a place moves that is fixed to a free link."""
+    """Return the motion of a place that is fixed to a free link."""
     offsets = entity.offsets
     start = offsets["linear_velocity"]
     linear = numbers[start], numbers[start + 1], numbers[start + 2]

@@ -1,9 +1,9 @@
-"""The canonical layout of a frame: which entity, in name order, keeps which numbers where.
+"""The canonical layout of a frame: the places of each entity's numbers, in name order.
 
-An entity's slots stand in one run of float64 numbers: first what its solver writes (the fields of its model, the memory
-of rules, motion and actuators), then what its owner writes (the memory of its sensors). A layout is a pure function of
-the deployment, so every process builds the same one and its digest names it. What can come and go is in it from the
-start: a slot says whether it is absent.
+An entity's slots are one run of float64 numbers: first those of its solver (the fields of its model, the slots of
+rules, motion and actuators), then those of its owner (the slots of its sensors). A layout is a pure function of the
+deployment, so every process builds the same one and its digest names it. Entities that can come and go are in it from
+the start, with a slot for their absence.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from foosim.world.forms.settings import ComponentSettings, ModifierSettings, Rob
 from foosim.world.spec import WorldSpec
 
 WORLD: Final = "world"
-"""Name and model of the entity without a body that has what the rules of the world remember; in a world whose rules
-remember nothing it is not there."""
+"""Name and model of the entity without a body that has the slots of the world's rules; it is missing in a world whose
+rules have no slots."""
 MOTION: Final = "motion"
-"""Component name of the slots in which a motion remembers."""
+"""Component name of the slots of a motion."""
 
 WORLD_MODEL: Final = Model(
     type_name="model", name=WORLD, factory=object, settings=RobotSettings, slots={}, is_robot=False
@@ -60,7 +60,7 @@ class Entity:
     stop: int
     offsets: Mapping[str, int]
     counts: Mapping[str, int]
-    """The place of the first number of each field, and how many it has."""
+    """The place of the first number of each field, and the count of its numbers."""
     fields: Mapping[str, int]
     """Those of its model, with their counts."""
 
@@ -86,24 +86,24 @@ class Entity:
 
     @property
     def is_free(self) -> bool:
-        """Whether it is a rigid body that nothing holds: it can be pushed."""
+        """Whether it is a free rigid body: it can be pushed."""
         return self.kind.is_rigid and LINEAR_VELOCITY in self.offsets
 
     @property
     def can_leave(self) -> bool:
-        """Whether it can be removed from the world and added to it: what has a place and is solved, but for what a kit
-        always brings."""
+        """Whether it can be removed from the world and added to it: a solved entity with a place, except the
+        lasting ones of a kit."""
         return ABSENT in self.offsets
 
     def is_absent(self, numbers: Sequence[float]) -> bool:
-        """Whether it is not in the world in a frame of these numbers."""
+        """Whether it is absent from the world in a frame of these numbers."""
         at = self.offsets.get(ABSENT)
         return at is not None and numbers[at] != 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """The slots that are not of an entity's model, by name, with the count of their numbers: the solver's and the
+    """The slots of an entity beside those of its model, by name, with the count of their numbers: the solver's and the
     owner's."""
 
     solver: Mapping[str, int]
@@ -115,17 +115,17 @@ NOTHING: Final = Carried({}, {})
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What a layout has of the deployment.
+    """The part of a deployment in a layout.
 
-    `carried` is what entities carry, by name; `memory` what the rules of the world remember of each entity of a model;
-    `spares` the entities that are absent at the start, `lasting` those that never leave; `switched` the robots with
-    components, which can be switched off; `fields` those of the state of
-    entities whose model has no fixed ones, by name; `variants` what entities are, by name, whose settings ask for a
-    variant of their model; `demanded` the fields on demand that entities have, by name.
+    `carried` are the slots that entities carry, by name; `rule_slots` those of the world's rules for each entity of a
+    model; `spares` the entities that are absent at the start, `lasting` the entities that never leave; `switched` the
+    robots with components, which can be switched off; `fields` the fields of entities whose model has no fixed ones, by
+    name; `variants` the descriptions of entities with a variant of their model, by name; `demanded` the fields on
+    demand of entities, by name.
     """
 
     carried: Mapping[str, Carried] = field(default_factory=dict)
-    memory: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    rule_slots: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     spares: frozenset[str] = frozenset()
     lasting: frozenset[str] = frozenset()
     switched: frozenset[str] = frozenset()
@@ -134,7 +134,7 @@ class Declared:
     demanded: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     def kind_of(self, name: str, model: str) -> Model:
-        """Return what there is to know of an entity, by its name and that of its model."""
+        """Return the description of an entity, by its name and that of its model."""
         return self.kinds.get(name) or _model(model)
 
     def fields_of(self, name: str, kind: Model) -> Mapping[str, int]:
@@ -143,17 +143,17 @@ class Declared:
         more = self.demanded.get(name)
         return {**fields, **more} if more else fields
 
-    def remembered(self, kind: Model) -> dict[str, int]:
-        """Return the slots in which the rules of the world remember what they know of each entity of a model."""
-        of_robots = self.memory.get(ROBOTS, {}) if kind.is_robot else {}
-        return {**self.memory.get(kind.name, {}), **of_robots}
+    def slots_of_rules(self, kind: Model) -> dict[str, int]:
+        """Return the slots of the world's rules for each entity of a model."""
+        of_robots = self.rule_slots.get(ROBOTS, {}) if kind.is_robot else {}
+        return {**self.rule_slots.get(kind.name, {}), **of_robots}
 
 
 class Layout:
-    """Entities in name order and where their slots are. Two layouts are equal when their digests are."""
+    """Entities in name order and the places of their slots. Two layouts are equal when their digests are."""
 
     def __init__(self, models: Mapping[str, str], declared: Declared) -> None:
-        """Build from the model of every entity, by name, and what the deployment says."""
+        """Build from the model of every entity, by name, and the part of the deployment."""
         entities = []
         position = 0
         for index, name in enumerate(sorted(models)):
@@ -162,7 +162,7 @@ class Layout:
             start = position
             offsets: dict[str, int] = {}
             fields = declared.fields_of(name, kind)
-            counts: dict[str, int] = {**fields, **declared.remembered(kind), **its.solver}
+            counts: dict[str, int] = {**fields, **declared.slots_of_rules(kind), **its.solver}
             if "position" in fields and kind.is_solved and name not in declared.lasting:
                 counts[ABSENT] = 1
             if name in declared.switched:
@@ -202,11 +202,11 @@ class Layout:
         self.resting = tuple([entity for entity in entities if STILL_TICKS in entity.offsets])
         """Bodies that may come to rest, in name order."""
         self._shared: dict[tuple[str, int], tuple[WorldSpec, object]] = {}
-        """By what it is and the identity of the world, which is kept with it."""
+        """By kind and the identity of the world, which is kept with the value."""
         self._digest = b""
 
     def shared(self, what: str, spec: WorldSpec, make: Callable[[], object]) -> object:
-        """Return what all that look at this layout in a world share, made when it is first asked for."""
+        """Return a value shared by all users of this layout in a world, built at its first use."""
         _, found = self._shared.get((what, id(spec)), (None, None))
         if found is None:
             found = make()
@@ -219,7 +219,7 @@ class Layout:
 
     @staticmethod
     def kind_of(model: str) -> Model:
-        """Return what there is to know of a model."""
+        """Return the description of a model."""
         return _model(model)
 
     @property
@@ -276,7 +276,7 @@ def build_layout(spec: WorldSpec) -> Layout:
         models |= {**kit.entities, **its}
         spares |= its.keys()
         lasting |= kit.entities.keys()
-    memory, of_world = _memory(spec)
+    rule_slots, of_world = _rule_slots(spec)
     if of_world:
         models[WORLD] = WORLD
     models |= {name: one.model for section in (spec.objects, spec.robots) for name, one in section.items()}
@@ -288,7 +288,7 @@ def build_layout(spec: WorldSpec) -> Layout:
     demanded = {name: found for name, robot in spec.robots.items() if (found := _demanded(robot))}
     switched = frozenset([name for name, robot in spec.robots.items() if switches_of(robot)])
     coming = frozenset(spares), frozenset(lasting), switched
-    return Layout(models, Declared(carried, memory, *coming, fields, kinds, demanded))
+    return Layout(models, Declared(carried, rule_slots, *coming, fields, kinds, demanded))
 
 
 def switches_of(robot: RobotSettings) -> dict[str, int]:
@@ -297,7 +297,7 @@ def switches_of(robot: RobotSettings) -> dict[str, int]:
 
 
 def spares_of(spec: WorldSpec, kit: Kit) -> Mapping[str, str]:
-    """Return what a kit of a world brings that is absent at the start, its models by name."""
+    """Return the entities of a world's kits that are absent at the start, their models by name."""
     return {} if kit.spares is None else kit.spares(spec.kits[kit.name])
 
 
@@ -317,28 +317,28 @@ def _model(kind: str) -> Model:
     return WORLD_MODEL if kind == WORLD else registry.find_model(kind)
 
 
-def _memory(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]:
-    """Return what the rules of a world remember: of each entity, by its model; and of the world."""
+def _rule_slots(spec: WorldSpec) -> tuple[dict[str, dict[str, int]], dict[str, int]]:
+    """Return the slots of a world's rules: for each entity, by its model; and for the world."""
     each: dict[str, dict[str, int]] = {}
     of_world: dict[str, int] = {}
     for label, settings in spec.world_rules.items():
         rule = settings.component_type
-        of_world |= _behind(label, rule.slots)
+        of_world |= _prefixed(label, rule.slots)
         for model, slots in rule.each.items():
-            each.setdefault(model, {}).update(_behind(label, slots))
+            each.setdefault(model, {}).update(_prefixed(label, slots))
     return each, of_world
 
 
 def of_motion(model: Model) -> dict[str, int]:
-    """Return the slots in which the motion of a model remembers."""
-    return {} if model.motion is None else _behind(MOTION, model.motion.slots)
+    """Return the slots of a model's motion."""
+    return {} if model.motion is None else _prefixed(MOTION, model.motion.slots)
 
 
 @dataclass(frozen=True, slots=True)
 class Declaring:
-    """What declares slots on an entity: what it is called, where it stands in the deployment, and its slots by name.
+    """A declaration of slots on an entity: its name in messages, its place in the deployment, and its slots by name.
 
-    `is_owners` says that the owner writes them, and not the solver.
+    `is_owners`: the owner writes them instead of the solver.
     """
 
     what: str
@@ -348,7 +348,7 @@ class Declaring:
 
 
 def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Declaring]:
-    """Yield what declares slots on a robot: its motion, its components with their modifiers, and its rules."""
+    """Yield the declarations of slots on a robot: its motion, its components with their modifiers, and its rules."""
     place: Location = ("robots", name)
     model = robot.component_type
     fields = model.fields_of(robot, spec)
@@ -358,11 +358,11 @@ def declaring(spec: WorldSpec, name: str, robot: RobotSettings) -> Iterator[Decl
         component = actuator.component_type
         slots = _slots(label, component, actuator, Carrier(0, spec.tick_ns, joints))
         if component.jobs:
-            slots |= _behind(label, job_slots(spec.senders_to(name)))
+            slots |= _prefixed(label, job_slots(spec.senders_to(name)))
         slots |= _slots_of_modifiers(label, actuator.modifiers, numbers_of(component, actuator, fields), spec.tick_ns)
         yield Declaring(f"actuator {label}", (*place, "actuators", label), slots)
     for label, rule in sorted(robot.rules.items()):
-        slots = _behind(label, rule.component_type.slots_on(fields))
+        slots = _prefixed(label, rule.component_type.slots_on(fields))
         yield Declaring(f"rule {label}", (*place, "rules", label), slots)
     for label, sensor in sorted(robot.sensors.items()):
         component = sensor.component_type
@@ -379,7 +379,7 @@ def least_period_ns(spec: WorldSpec, sensor: Component, settings: SensorSettings
 
 
 def trigger_slot(robot: Entity, channel: str, field: str) -> str:
-    """Return the slot of a robot that makes a sensor of it measure: its own, else the robot's."""
+    """Return the slot of a robot that triggers a sensor of it: the sensor's own, else the robot's."""
     own = f"{channel}.{field}"
     return own if robot.offsets.get(own, -1) >= robot.split else field
 
@@ -396,7 +396,7 @@ def _demanded(robot: RobotSettings) -> dict[str, int]:
 
 
 def _carried(spec: WorldSpec, name: str, robot: RobotSettings) -> Carried:
-    """Return the slots of a robot that are not of its model."""
+    """Return the slots of a robot beside those of its model."""
     solver: dict[str, int] = {}
     owner: dict[str, int] = {}
     for one in declaring(spec, name, robot):
@@ -415,16 +415,16 @@ def _slots_of_modifiers(
 
 
 def _slots(name: str, component: Component, settings: ComponentSettings, carrier: Carrier) -> dict[str, int]:
-    return _behind(name, component.slots_on(settings, carrier))
+    return _prefixed(name, component.slots_on(settings, carrier))
 
 
 def _kept(slots: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return slots, whose counts stay the objects that they are: compiled, a count that is taken as an `int` becomes a
-    plain one, which refers to nothing."""
+    """Return slots with the same objects as counts: in compiled code a count that is taken as an `int` becomes a plain
+    number, without its reference."""
     return slots
 
 
-def _behind(name: str, slots: Mapping[str, int]) -> dict[str, int]:
+def _prefixed(name: str, slots: Mapping[str, int]) -> dict[str, int]:
     """Return the slots of a component by their names on an entity."""
     return {f"{name}.{slot}": count for slot, count in _kept(slots).items()}
 

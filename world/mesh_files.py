@@ -1,8 +1,8 @@
 """Meshes from outside: the text of an OBJ or the bytes of an STL file, checked, as vertices and triangles.
 
-Everything that a physics engine takes for granted is checked here, in Python, before one sees it: a face that names a
-vertex which is not there ends the process that hands it to Bullet. What is not acceptable raises `AssetError` with
-file, line and reason. Materials and textures are not read, so no file names another one. Pure: the content is given.
+Everything that a physics engine takes for granted is checked here, in Python, before one sees it: a face with an
+unknown vertex ends the process that hands it to Bullet. An invalid mesh raises `AssetError` with file, line and
+reason. Materials and textures are not read, so no file names another one. Pure: the content is given.
 
 OBJ: Wavefront's Advanced Visualizer manual, appendix B1. STL: 3D Systems' interface specification of 1989.
 """
@@ -25,10 +25,10 @@ from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, Mesh
 
 EXTENT_MIN_M: Final = 1e-4
 EXTENT_MAX_M: Final = 1e3
-"""How large the longest side of a mesh is, at least and at most, after scaling; no coordinate is farther out."""
+"""The least and greatest longest side of a mesh after scaling (m); no coordinate is farther out."""
 FACE_CORNERS_MAX: Final = 1024
 CLOSED_KEPT: Final = 16
-"""Meshes of which it is remembered whether they are closed: that takes 0.2 s for the largest."""
+"""The count of meshes with a kept result of the test whether they are closed: it takes 0.2 s for the largest."""
 _STL_HEAD: Final = 84
 _STL_TRIANGLE: Final = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 _FLOAT: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
@@ -45,13 +45,13 @@ def read_mesh(name: str, content: bytes, scale: float = 1.0) -> Mesh:
     if len(content) > limits.ASSET_BYTES_MAX:
         raise AssetError(f"{name}: {len(content)} bytes, at most {limits.ASSET_BYTES_MAX} are allowed")
     vertices, triangles = _READERS[suffix](name, content)
-    with np.errstate(over="ignore"):  # what overflows is refused
+    with np.errstate(over="ignore"):  # an overflow is refused
         vertices = vertices * scale
     return _checked(name, vertices, triangles)
 
 
 def pieces(mesh: Mesh, triangles_max: int) -> Iterator[Mesh]:
-    """Yield a mesh, or if it has more triangles several that are it together."""
+    """Yield a mesh, or, if it has more triangles, its parts."""
     if len(mesh.triangles) <= triangles_max:
         yield mesh
         return
@@ -69,7 +69,7 @@ def is_closed(mesh: Mesh) -> bool:
 
 
 def _checked(name: str, vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Mesh:
-    """Leave out what has no area and what no triangle uses; refuse what is too big, too small or not finite."""
+    """Leave out triangles without an area and unused vertices; refuse a mesh too big, too small or not finite."""
     far = float(np.abs(vertices).max(initial=0.0))
     if not far <= EXTENT_MAX_M:  # nan is not, either
         raise AssetError(f"{name}: a coordinate of {far:g} m, the farthest that is valid is {EXTENT_MAX_M:g} m")
@@ -117,7 +117,7 @@ def _text(name: str, content: bytes) -> Iterator[tuple[int, list[str]]]:
 
 
 def _numbers(place: str, words: list[str]) -> tuple[float, float, float]:
-    """Return three coordinates; the texts `nan`, `inf` and `1_0`, which Python reads, are none."""
+    """Return three coordinates; the texts `nan`, `inf` and `1_0`, which Python reads, are refused."""
     if len(words) != 3:
         raise AssetError(f"{place}: {len(words)} coordinates, a vertex has 3")
     for word in words:
@@ -151,7 +151,7 @@ def _read_obj(name: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[n
                 raise _too_many(f"{name}:{line}")
         elif key not in _PASSED_OVER:
             choices = ", ".join(["v", "f", *sorted(_PASSED_OVER)])
-            raise AssetError(f"{name}:{line}: {describe('no statement that is read', key)}, there are {choices}")
+            raise AssetError(f"{name}:{line}: {describe('an unknown statement', key)}, there are {choices}")
     for line, corners in faces:  # a face may come before its vertices
         if max(corners) >= len(vertices):
             raise AssetError(f"{name}:{line}: a face with vertex {max(corners) + 1}, there are {len(vertices)}")
@@ -159,7 +159,7 @@ def _read_obj(name: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def _corners(place: str, words: list[str], count: int) -> list[int]:
-    """Return a face's vertices, counted from 0; `count` is how many there are so far."""
+    """Return a face's vertices, counted from 0; `count` is their count so far."""
     if not 3 <= len(words) <= FACE_CORNERS_MAX:
         raise AssetError(f"{place}: a face of {len(words)} corners, it has 3 to {FACE_CORNERS_MAX}")
     corners = []
@@ -195,7 +195,7 @@ def _read_binary(name: str, content: bytes, count: int) -> tuple[NDArray[np.floa
     corners = np.frombuffer(content, _STL_TRIANGLE, offset=_STL_HEAD)["corners"].astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
     if len(bad):
-        raise AssetError(f"{name}: triangle {bad[0] + 1} has a coordinate that is not finite")
+        raise AssetError(f"{name}: triangle {bad[0] + 1} has a non-finite coordinate")
     return _merged(corners.reshape(-1, 3))
 
 
@@ -208,7 +208,7 @@ _FACET: Final = (
     ("endloop",),
     ("endfacet",),
 )
-"""How the lines of a facet begin."""
+"""The first words of the lines of a facet."""
 
 
 def _read_facets(name: str, content: bytes) -> Iterator[tuple[float, float, float]]:
@@ -236,7 +236,7 @@ def _read_facets(name: str, content: bytes) -> Iterator[tuple[float, float, floa
 
 
 def _merged(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Return vertices and triangles of three corners each: what is equal to the last bit is one vertex."""
+    """Return vertices and triangles of three corners each: corners equal to the last bit are one vertex."""
     rows = np.ascontiguousarray(corners + 0.0).view("V24").ravel()  # compared as bytes: five times as fast as by axis
     vertices, index = np.unique(rows, return_inverse=True)
     return vertices.view(np.float64).reshape(-1, 3), index.reshape(-1, 3).astype(np.int32)

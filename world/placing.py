@@ -1,4 +1,4 @@
-"""Where something is, in a deployment: `at: {x: 1 m, yaw: 90 deg}`."""
+"""Poses in a deployment: `at: {x: 1 m, yaw: 90 deg}`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from foosim.world.scene import Quaternion, Vector, from_rpy
 
 LinkName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=64)]
 FAR_M: Final = 100_000.0
-"""How far from the origin anything is put at most, in each coordinate."""
+"""The greatest distance of a place from the origin, in each coordinate (m)."""
 Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
 Turn = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 
@@ -47,7 +47,7 @@ class MountedAt(At):
 
 
 def is_placed(settings: type[SpecBase]) -> bool:
-    """Whether settings say where an entity starts: its pose, or its place on the ground and its heading."""
+    """Whether settings have the start of an entity: its pose, or its place on the ground and its heading."""
     return "at" in settings.model_fields or {"x", "y", "heading"}.issubset(settings.model_fields)
 
 

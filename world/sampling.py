@@ -1,8 +1,8 @@
-"""At which ticks robots have something to send: a pure function of deployment and frame.
+"""The ticks at which robots send packets: a pure function of deployment and frame.
 
-At a tick at which no sensor is due and no outbox holds anything, every node's samples are empty, and everybody knows:
-they are neither sent nor waited for. At 100 Hz and ticks of 2 ms that spares four messages of five on this way. Where
-a sample is not due and no packet fills an outbox the vHub also knows it before the frame is there.
+At a tick without a due sensor and with empty outboxes, every node's samples are empty, and each process computes that:
+they are neither sent nor awaited. At 100 Hz and ticks of 2 ms this saves four messages of five on this way. Where no
+sample is due and no packet fills an outbox the vHub also computes it before the frame arrives.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from foosim.world.spec import WorldSpec
 
 
 class Sampling:
-    """The ticks of all sensors of a deployment, and the numbers of frames that make some measure besides."""
+    """The ticks of all sensors of a deployment, and the numbers of frames that trigger some of them."""
 
     def __init__(self, spec: WorldSpec) -> None:
         sensors = [sensor for robot in spec.robots.values() for sensor in robot.sensors.values()]
         self._schedules = tuple(sorted({spec.schedule(sensor) for sensor in sensors}))
-        self._speaking = sorted(
+        self._triggers = sorted(
             {
                 (name, channel, trigger)
                 for name, robot in spec.robots.items()
@@ -41,16 +41,16 @@ class Sampling:
         return any((tick * step + shift) % period < step for step, shift, period in self._schedules)
 
     @property
-    def speaking(self) -> frozenset[tuple[str, str]]:
+    def triggered(self) -> frozenset[tuple[str, str]]:
         """Robots and channels of the sensors that may measure at any tick."""
-        return frozenset([(robot, channel) for robot, channel, _ in self._speaking])
+        return frozenset([(robot, channel) for robot, channel, _ in self._triggers])
 
     def is_silent(self, frame: Frame) -> bool:
         """Whether no robot sends anything at the frame's tick."""
         return not frame.outboxes and not self.is_due(frame.tick) and not self._has_spoken(frame)
 
     def _has_spoken(self, frame: Frame) -> bool:
-        if not self._speaking:
+        if not self._triggers:
             return False
         layout = frame.layout
         if layout.digest != self._layout:
@@ -58,7 +58,7 @@ class Sampling:
             self._places = np.array(
                 [
                     layout[name].offsets[trigger_slot(layout[name], channel, field)]
-                    for name, channel, field in self._speaking
+                    for name, channel, field in self._triggers
                     if name in layout
                 ],
                 np.intp,
@@ -67,5 +67,5 @@ class Sampling:
 
 
 def are_answered(packets: Iterable[Delivered]) -> bool:
-    """Whether robots put something into their outboxes for one of these packets."""
+    """Whether robots fill their outboxes by one of these packets."""
     return any(packet.channel == CHANNEL_ECHO for packet in packets)

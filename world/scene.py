@@ -1,8 +1,8 @@
-"""What the world is made of: shapes, links and joints of every body, and the one forward kinematics.
+"""The scene of a world: shapes, links and joints of every body, and the one forward kinematics.
 
 Engines build their bodies from a `Scene`, viewers draw it, sensors and the vHub place links with it, so there is one
 description of each. Frame of reference: the world's (x along the field, y across, z up), SI units, quaternions
-x, y, z, w. What enters a frame or a fate is computed here with + - * / and `math.sqrt`, `math.sin`, `math.cos` only,
+x, y, z, w. Numbers of a frame or a fate are computed here with + - * / and `math.sqrt`, `math.sin`, `math.cos` only,
 in one spelling.
 """
 
@@ -22,7 +22,7 @@ Colour = tuple[float, float, float, float]
 Pose = tuple[str, Vector, Quaternion]
 """Name of a link, position of its origin and orientation, in the world frame."""
 
-# Not Final: compiled by mypyc 2.4, a Final tuple of so many floats counts as not set.
+# Not Final: compiled by mypyc 2.4, a Final tuple of this many floats counts as not set.
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
@@ -71,7 +71,7 @@ Geometry: TypeAlias = Box | Sphere | Cylinder | Capsule | Hull | Mesh
 class Shape:
     """A geometry at a pose in its link (in the world for scenery), its surface (a key of the physics') and colour.
 
-    `radio` is what waves lose in it; `name` is that of the scenery it belongs to, empty in a body, which has its own.
+    `radio` is its loss of waves; `name` is that of the scenery it belongs to, empty in a body, which has its own.
     """
 
     geometry: Geometry
@@ -97,7 +97,7 @@ class Link:
 
     `inertia` is the diagonal about the centre of mass, in the principal axes, whose orientation in the link's frame is
     `principal`. A motor of the joint has at most the force `effort` (N or N m) and the speed `speed` (m/s or rad/s);
-    `damping` is what its speed is resisted with (N s/m or N m s/rad).
+    `damping` is the resistance to its speed (N s/m or N m s/rad).
     """
 
     name: str
@@ -137,8 +137,8 @@ class Body:
     that move have a number each in `joint_positions`, in the order of their links.
 
     Radio waves leave from `antenna`, a place in the frame of the link `antenna_link` (an index). `speed_limit` (m/s) is
-    how fast any part of a free body can be, a promise of its model. What is not `is_solid` is only drawn: rays pass it,
-    and nothing stops at it.
+    the greatest speed of any part of a free body, a promise of its model. A body without `is_solid` is only drawn: rays
+    and bodies pass it.
     """
 
     name: str
@@ -188,8 +188,8 @@ def inertia_about(link: Link, axis: Vector, centre: Vector) -> float:
 
 
 def load_of(body: Body, index: int) -> float:
-    """Return what a motor accelerates on the joint of a link while all others stand still: of one that slides the mass
-    (kg) of its link and of all links that hang on that, of one that turns the moment of inertia (kg m2) of its link."""
+    """Return the load of a motor on the joint of a link while all others rest: for one that slides the mass (kg) of its
+    link and of all links that hang on that, for one that turns the moment of inertia (kg m2) of its link."""
     link = body.links[index]
     if link.joint != "prismatic":
         return inertia_about(link, link.axis, link.centre_of_mass)
@@ -285,7 +285,7 @@ def shape_box(shape: Shape) -> tuple[Vector, Vector]:
 
 
 def in_pieces(shapes: Iterable[Shape], triangles_max: int) -> Iterator[Shape]:
-    """Yield shapes; a mesh of more than so many triangles as several, in the order of its triangles."""
+    """Yield shapes; a mesh with more triangles than `most` as several, in the order of its triangles."""
     for shape in shapes:
         mesh = shape.geometry
         if not isinstance(mesh, Mesh):

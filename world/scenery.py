@@ -1,8 +1,8 @@
 """Fixed things that a deployment puts into its world beside table or hall: boxes, cylinders, and meshes from files.
 
-This is their schema, and how they become shapes of the scene. A mesh's file is named by a path inside the deployment's
-asset folder; its digest is written beside it when a run is planned, so that the deployment's text alone says which
-world is meant, on every machine.
+This is their schema, and their conversion to shapes of the scene. A mesh's file is a path inside the deployment's
+asset folder; its digest is written beside it when a run is planned, so that the deployment's text alone identifies
+the world, on every machine.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LETTERS: Final = "letters, digits, _, - and . (not at the beginning)"
 
 
 def path_problem(path: str, folder: str = "the asset folder") -> str:
-    """Return why a text is no path inside a folder, as messages call it; empty if it is one.
+    """Return the problem of a text as a path inside a folder, as messages name that; empty for a valid one.
 
     The file system is not read.
     """
@@ -87,7 +87,7 @@ SurfaceName = Annotated[str, StringConstraints(max_length=48)]
 
 
 class Material(SpecBase):
-    """How a thing looks, as shares of red, green and blue."""
+    """The colour of a thing, as shares of red, green and blue."""
 
     red: Share = 0.6
     green: Share = 0.6
@@ -99,9 +99,9 @@ class Material(SpecBase):
 
 
 class Placed(SpecBase):
-    """Where a thing stands: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
+    """The pose of a thing: its origin; and turned about the world's x (roll), then y (pitch), then z (yaw).
 
-    `surface` is what rigid bodies feel of it, '' nothing; `radio` what waves that cross it lose: 5 dB by default.
+    `surface` is its surface in contacts, '' for none; `radio` the loss of waves that cross it: 5 dB by default.
     """
 
     x: Position = default("0 m")
@@ -141,7 +141,7 @@ class SceneryCylinder(Placed):
 
 
 class SceneryMesh(Placed):
-    """The triangles of a file. `scale` is metres per unit of the file; `digest` (BLAKE2b) says which file is meant."""
+    """The triangles of a file. `scale` is metres per unit of the file; `digest` (BLAKE2b) identifies the file."""
 
     shape: Literal["mesh"]
     file: MeshPath
@@ -155,7 +155,7 @@ Scenery = Annotated[SceneryThing, Field(discriminator="shape")]
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What is in the files that scenery is made of: by path, by digest (hex), and as meshes by the thing's name."""
+    """The contents of the files of scenery: by path, by digest (hex), and as meshes by the thing's name."""
 
     files: Mapping[str, bytes] = field(default_factory=dict)
     by_digest: Mapping[str, bytes] = field(default_factory=dict)
@@ -167,7 +167,7 @@ def read_contents(
 ) -> Contents:
     """Read the files of all meshes, and keep `others`.
 
-    Raises AssetError for one that is missing, not the one meant or not acceptable.
+    Raises AssetError for a file that is missing, has another digest or is invalid.
     """
     meshes: dict[str, Mesh] = {}
     known: dict[tuple[str, float], Mesh] = {}
@@ -206,7 +206,7 @@ def scenery_shape(name: str, thing: SceneryThing, mesh: Mesh | None) -> Shape:
 
 
 def open_meshes(scenery: Mapping[str, SceneryThing], meshes: Mapping[str, Mesh]) -> list[str]:
-    """Return the things whose material needs a way through them that their mesh, which is not closed, does not have."""
+    """Return the things with an open mesh, whose material needs the way of waves through them."""
     if not meshes:
         return []
     from foosim.world.mesh_files import is_closed
@@ -219,6 +219,6 @@ def open_meshes(scenery: Mapping[str, SceneryThing], meshes: Mapping[str, Mesh])
 
 
 def mesh_files(scenery: Mapping[str, SceneryThing]) -> dict[str, str | None]:
-    """Return the files that scenery is made of, in name order, each with the digest that is written beside it."""
+    """Return the files of scenery, in name order, each with the digest that is written beside it."""
     meshes = [thing for thing in scenery.values() if isinstance(thing, SceneryMesh)]
     return {mesh.file: mesh.digest for mesh in sorted(meshes, key=lambda mesh: mesh.file)}

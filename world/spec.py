@@ -1,4 +1,4 @@
-"""The world part of a deployment: what is computed, and nothing of where it is computed or what lies between."""
+"""The world part of a deployment: the computed entities, without machines and network."""
 
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
@@ -31,26 +31,26 @@ from foosim.world.scenery import (
 )
 
 KITS: Final = "kits"
-"""The field of kits' sections, which in a file stand each under the name of its kit."""
+"""The field of kits' sections, each of which is under the name of its kit in a file."""
 KITS_MAX: Final = 16
 RULES_MAX: Final = 64
 SURFACES_MAX: Final = 64
 ROBOT_FILES_MAX: Final = 128
-"""Files that models of robots are made from, in one world."""
+"""The greatest count of files of robots' models in one world."""
 
 Section = TypeVar("Section", bound=SpecBase)
 
 
 class Timed(Protocol):
-    """What happens at a rate."""
+    """Settings with a rate."""
 
     @property
     def rate_hz(self) -> Fraction:
-        """How often."""
+        """The rate."""
 
     @property
     def offset_ns(self) -> int:
-        """By how much later than a multiple of the period."""
+        """The delay after a multiple of the period."""
 
 
 class Schedule(NamedTuple):
@@ -58,8 +58,8 @@ class Schedule(NamedTuple):
 
     A reading is due at times t for which (t - offset) rate is whole. It is taken at the first tick not before, so at
     most a tick's length later: at tick k where floor((k T - offset) rate) is more than at tick k - 1, T being the tick.
-    The numbers are this inequality in integers, divided by what they have in common. With a period of n whole ticks
-    they are 1, -offset in ticks, n.
+    The numbers are this inequality in integers, divided by their greatest common divisor. With a period of n whole
+    ticks they are 1, -offset in ticks, n.
     """
 
     step: int
@@ -72,12 +72,12 @@ class Schedule(NamedTuple):
 
     @property
     def least_ticks(self) -> int:
-        """The least number of ticks between two readings; where they are not as many each time, there is one more."""
+        """The least number of ticks between two readings; where the period is not whole ticks, some have one more."""
         return self.period // self.step
 
 
 def schedule_of(timed: Timed, tick_ns: int) -> Schedule:
-    """Return the schedule of what happens at a rate, which is not above that of the ticks."""
+    """Return the schedule of a rate, at most that of the ticks."""
     rate = timed.rate_hz
     step, period = tick_ns * rate.numerator, units.NS_PER_S * rate.denominator
     shift = -timed.offset_ns * rate.numerator
@@ -102,10 +102,10 @@ def _kits(names: Iterable[str]) -> list[Kit]:
 
 
 class WorldSpec(SpecBase):
-    """The world: its robots, the sections of kits, rules, a scene, fixed things, and what is set at which time.
+    """The world: its robots, the sections of kits, rules, a scene, fixed things, and events.
 
-    `digests` (BLAKE2b) say which files are meant that models of robots are made from, by path in the asset folder; they
-    are written when a run is planned. A world without an `engine` has bullet if there are rods or balls in it, else
+    `digests` (BLAKE2b) identify the files of robots' models, by path in the asset folder; they are written when a run
+    is planned. A world without an `engine` has bullet if there are rods or balls in it, else
     mujoco.
     """
 
@@ -163,18 +163,18 @@ class WorldSpec(SpecBase):
         return self.robots.get(name) or self.objects.get(name)
 
     def with_contents(self, contents: Contents) -> Self:
-        """The same with what is in the files that it names."""
+        """Return the world with the contents of the files that it names."""
         spec = self.model_copy()
         spec._contents = contents
         return spec
 
     @property
     def asset_files(self) -> Mapping[str, bytes]:
-        """The contents of the files that it was given, by path."""
+        """The contents of the given files, by path."""
         return self._contents.files
 
     def robot_files(self, files: Mapping[str, bytes]) -> list[str]:
-        """The files that models of robots are made from, in name order, as far as `files` (contents by path) tell.
+        """The files of robots' models, in name order, as far as `files` (contents by path) name them.
 
         Raises AssetError.
         """
@@ -188,7 +188,7 @@ class WorldSpec(SpecBase):
         return sorted(found)
 
     def check_robot_files(self, files: Mapping[str, bytes]) -> None:
-        """Raise AssetError for a file of a robot that is missing, not the one meant or not acceptable."""
+        """Raise AssetError for a file of a robot that is missing, has another digest or is invalid."""
         for path in self.robot_files(files):
             if path not in files:
                 raise AssetError(f"{path}: the file of a robot is missing")
@@ -199,12 +199,12 @@ class WorldSpec(SpecBase):
 
     @property
     def lacks_files(self) -> bool:
-        """Whether a file was not given that a robot's model is made from: nothing is known of its body and state."""
+        """Whether a file of a robot's model is missing: its body and state are unknown."""
         files = self._contents.files
         return any(path not in files for path in self.robot_files(files))
 
     def file_with(self, digest: str) -> bytes | None:
-        """The content of the file with this digest (hex), of those that it was given."""
+        """The content of the given file with this digest (hex)."""
         return self._contents.by_digest.get(digest)
 
     def mesh_of(self, thing: str) -> Mesh | None:

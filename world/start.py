@@ -1,4 +1,4 @@
-"""Where a run begins, as a value that messages and files carry: frame 0, or the frame of another run."""
+"""The start of a run, as a value that messages and files carry: frame 0, or the frame of another run."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from foosim.world.robot_packets import Outboxes
 
 
 class Origin(Item, frozen=True):
-    """Where a run begins that does not begin anew: at frame `tick` of `source`, with that frame's digest and the chain
-    over all frames up to it."""
+    """The start of a run from another one: at frame `tick` of `source`, with that frame's digest and the chain over all
+    frames up to it."""
 
     tick: Counter
     source: Text
@@ -19,9 +19,9 @@ class Origin(Item, frozen=True):
 
 
 class Start(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A frame that a run begins with instead of frame 0, and where it comes from.
+    """A frame that a run begins with instead of frame 0, and its source.
 
-    The frame says all: positions and speeds, score, the memory of rules, actuators and sensors, outboxes.
+    The frame has all state: positions and speeds, score, the slots of rules, actuators and sensors, outboxes.
     """
 
     origin: Origin

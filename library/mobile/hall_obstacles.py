@@ -1,8 +1,8 @@
 """Obstacles of rovers: outlines of walls, stations and scenery, seen from above (`rays.outlines`), with names; and
 checks that rovers start, and stations are, inside the hall and outside of these.
 
-A base station is a circle. What is higher than a rover with its antenna, or below the floor, is none. The walls of the
-hall are obstacles like all others, so that nothing leaves it.
+A base station is a circle. Shapes higher than a rover with its antenna, or below the floor, are no obstacles. The walls
+of the hall are obstacles like all others, so that nothing leaves it.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def start_findings(spec: WorldSpec) -> Iterator[Finding]:
 
 
 class _Rovers:
-    """Where rovers start, by squares of a grid, so that each is compared with those near it alone."""
+    """The starts of rovers, by squares of a grid, so that each is compared with near ones only."""
 
     def __init__(self, radius: float) -> None:
         self._radius = radius
@@ -105,7 +105,7 @@ def _misplaced(
     circle: tuple[float, float, float],
     taken: Iterable[tuple[str, Outline]],
 ) -> Iterator[Finding]:
-    """Yield what is wrong with the place of a robot, as a circle (m): the first thing that it is in."""
+    """Yield the problem of a robot's place, as a circle (m): the first thing that it overlaps."""
     x, y, _ = circle
     half_x, half_y = hall_of(spec).length / 2, hall_of(spec).width / 2
     met = next((f"in {what}" for what, thing in taken if not thing.is_clear(*circle)), None)

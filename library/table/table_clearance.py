@@ -1,6 +1,6 @@
 """Checks that a football table's scenery leaves room for rods, swinging figures and the kick-off.
 
-That takes geometry, so it is looked at when all single fields are right. A rod's tube and each of its figures sweep a
+This takes geometry, so it is done when all single fields are valid. A rod's tube and each of its figures sweep a
 cylinder about the rod's axis, over the whole stroke.
 """
 
@@ -24,7 +24,7 @@ TOUCH_M: Final = 0.0005
 
 @dataclass(frozen=True, slots=True)
 class _Swept:
-    """A moving body: its bounding box, and what it is in that."""
+    """A moving body: its bounding box, and its shape inside of that."""
 
     what: str
     low: Vector

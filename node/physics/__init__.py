@@ -1,1 +1,1 @@
-"""The engines themselves: their interface, what makes them, the bodies of each."""
+"""The engines: their interface, their building, the bodies of each."""

@@ -1,4 +1,4 @@
-"""Physics clients of Bullet, and what bodies are made of in them. This is the only file that imports pybullet."""
+"""Physics clients of Bullet, and the shapes of their bodies. This is the only file that imports pybullet."""
 
 from __future__ import annotations
 
@@ -78,17 +78,17 @@ def settings_of(physics: Physics, substep_s: float) -> dict[str, Any]:
         "numSolverIterations": physics.solver_iterations,
         "deterministicOverlappingPairs": 1,  # pairs are solved in an order of names, not of memory
         "minimumSolverIslandSize": 0,  # else small islands share one solver call, and stop on its common residual
-        "solverResidualThreshold": 0,  # else iteration stops on what the other islands of the call are doing
+        "solverResidualThreshold": 0,  # else iteration stops by the other islands of the call
         "contactERP": physics.contact_erp,  # 0.08 by default: restitution would be e + (0 to 0.08)
         "restitutionVelocityThreshold": 0.05,  # slower contacts do not bounce: a sphere comes to rest
-        "warmStartingFactor": 0,  # starts from the impulses of the last step, which are not in the frame
+        "warmStartingFactor": 0,  # starts from the impulses of the last step, unknown to the frame
         "contactSlop": 0,  # a tolerated penetration shifts where a contact begins
         "collisionFilterMode": 0,  # a pair needs both masks
     }
 
 
 def bullet_indices(client: int, body: int, count: int) -> tuple[int, ...]:
-    """Return Bullet's index of each of so many links of a body, in the order in which they were given.
+    """Return Bullet's index of each of the `count` links of a body, in the order in which they were given.
 
     Bullet numbers links depth first, and names each by its place in the order given: link1, link2, ...
     """
@@ -152,7 +152,7 @@ def _make_triangles(client: int, shape: Shape, *, placed: bool) -> int:
 
 
 def make_scenery(client: int, shape: Shape, groups: tuple[int, int], side: Side, *, rigid: bool = True) -> int:
-    """Make what stands, in a collision group and meeting others: `groups`.
+    """Make a fixed body in a collision group that meets others: `groups`.
 
     It is a rigid static: a tilted static *multibody* has its quaternion renormalised at every step.
     """
@@ -183,7 +183,7 @@ def make_dynamics(client: int, body: int, link: int, mass: float, inertia: Vecto
 
 
 def make_surface(client: int, body: int, link: int, side: Side) -> None:
-    """Set what a link brings to its contacts: Bullet takes the products of both sides' restitution and friction.
+    """Set the side of a link in contacts: Bullet takes the products of both sides' restitution and friction.
 
     Rolling friction is each side's own times the other's friction.
     """

@@ -1,4 +1,4 @@
-"""The Bullet engine: rules under which each tick starts from the frame completely, whatever this engine did before.
+"""The Bullet engine: rules under which each tick starts from the frame completely, independent of the engine's past.
 
 Bullet keeps more than positions and velocities: contact points of pairs, search axes, orders of pairs and islands. The
 rules below each undo one of these memories; tests/laws/test_engine_partition.py breaks each in turn and sees law 1
@@ -38,7 +38,7 @@ from foosim.world.components.drives import Motor, share_of
 from foosim.world.layout import Entity, Layout
 from foosim.world.scene import UPRIGHT, Body, Shape, Vector, in_pieces, load_of, swept_box
 
-# Pairs that can touch: free bodies with everything, nothing else. Jointed bodies may run through the scenery, and
+# Pairs that can touch: free bodies with everything, nothing else. Jointed bodies may pass through the scenery, and
 # without a filter a step costs five times as much.
 FREE_GROUP: Final = 1
 JOINTED_GROUP: Final = 2
@@ -51,8 +51,8 @@ FREE_FIELDS: Final = ("position", "orientation", "linear_velocity", "angular_vel
 NO_CONTACT: Final = (0.0, 0.0, -1.0)
 NO_TOUCHES: Final = TouchLog()
 BREAKING_THRESHOLD: Final = 0.02
-"""As a share of a sphere's radius it is how far it may roll in a substep: more than the way after which it has
-lifted its last point of contact by as much as it falls, sqrt(2 g r) substeps."""
+"""The way that a sphere may roll in a substep, as a share of its radius: more than the way after which it has lifted
+its last point of contact by as much as it falls, sqrt(2 g r) substeps."""
 _of_two_joints: Final = Struct("<4d").pack
 
 
@@ -61,9 +61,9 @@ class Chain:
     """A jointed body: its id in Bullet, its joints, as many zeros, and the places of its numbers in the frame.
 
     Of each joint `places` are its index and those of position, velocity and effort; `log` is that of the contacts.
-    `loads` are what the motors of its joints accelerate, `ends` what limits these, `stops` those of them that are
-    limited, each with its limits and the places of its position and velocity. `low` and `high` are the ends of the box
-    that its shapes reach, `axis` is that of its first joint, which may be one that `slides`.
+    `loads` are those of the motors of its joints, `ends` the limits of these, `stops` the limited joints, each
+    with its limits and the places of its position and velocity. `low` and `high` are the ends of the box around the
+    reach of its shapes, `axis` is that of its first joint, which may be one that `slides`.
     """
 
     body: int
@@ -81,7 +81,7 @@ class Chain:
 
 
 def _chain(made: int, body: Body, entity: Entity) -> Chain:
-    """Return a jointed body that was made."""
+    """Return the description of a built jointed body."""
     count = len(body.links)
     assert entity.counts["joint_positions"] == count, f"{body.name} has {count} joints"
     at, speed, effort = (entity.offsets[field] for field in ("joint_positions", "joint_velocities", "joint_efforts"))
@@ -103,7 +103,7 @@ def _chain(made: int, body: Body, entity: Entity) -> Chain:
 
 
 def _reach(body: Body, tick_s: float) -> float:
-    """Return how far from its position a free sphere, or what is round it, is felt within a tick (m)."""
+    """Return the reach of a free body from its position within a tick (m)."""
     low, high = swept_box(body)
     return max(*(abs(value) for value in (*low, *high))) + body.speed_limit * tick_s
 
@@ -134,7 +134,7 @@ class BulletEngine:
                 self._chains[name] = _chain(self._make_jointed(bodies[name]), bodies[name], layout[name])
         self._tick_s = deployment.tick_ns / 1e9
         self._comers = [(layout[name].offsets["position"], _reach(bodies[name], self._tick_s)) for name in self._free]
-        """Of free bodies: the place of their position in the frame, and how far from it they are felt within a tick."""
+        """Of free bodies: the place of their position in the frame, and their reach from it within a tick (m)."""
         self._free, self._chains = dict(sorted(self._free.items())), dict(sorted(self._chains.items()))
         self._bases = {name: body.position for name, body in bodies.items()}
         self._jointed_of_id = {chain.body: name for name, chain in self._chains.items()}
@@ -146,27 +146,27 @@ class BulletEngine:
         self._wipe()
 
     def _begin(self, layout: Layout) -> None:
-        """Set what a tick leaves behind, as none has been."""
+        """Clear the results of a tick."""
         self._loaded_jointed: set[str] = set()
         self._loaded_free: list[str] = []
         self._idle: set[str] = set()
         self._slack: dict[str, list[int]] = {}
-        """Jointed bodies with motors that have no force: the places of these motors' efforts."""
+        """Jointed bodies with motors without force: the places of these motors' efforts."""
         self._state: Sequence[float] = ()
         """The frame's numbers, as they were loaded."""
         self._governed: dict[str, MotorForces] = {}
         """Jointed bodies with motors whose forces are set at each substep."""
         self._stops: dict[str, Stops] = {}
-        """Those whose joints may come to an end within the tick."""
+        """Bodies whose joints may reach an end within the tick."""
         self._detailed = {name: layout[name] for name in self._chains if "touches" in layout[name].offsets}
-        """Jointed bodies that log who touches which of their links."""
+        """Jointed bodies that log the partners of their links' contacts."""
         self._indices = {name: layout[name].index for name in self._free}
         self._details: dict[str, TouchLog] = {}
-        """Those that were touched in the tick."""
+        """The logs of bodies that were touched in the tick."""
         self._logs: dict[str, tuple[float, float, float]] = {}
         self._touching: set[str] = set()
-        self._told: dict[str, bytes] = {}
-        """What the motors of each body with two joints were told last, to the bit: they follow it until told again."""
+        self._last_commands: dict[str, bytes] = {}
+        """The last commands of the motors of each body with two joints, to the bit: they hold until the next ones."""
 
     # --- building ----------------------------------------------------------------------------------------------------
 
@@ -174,9 +174,9 @@ class BulletEngine:
         """Return the parameters of the world.
 
         A sphere that rolls has its contact point in another place of its surface at each substep. Within this threshold
-        times its radius Bullet takes it for the point of before; else that one stays, as a further one, until it is
-        lifted, and what it has braked in the first iterations is not taken back: a sphere of 35 mm at 0.2 m/s would
-        brake by 23 % more than its rolling friction says. Contacts ahead of the touch are not processed at all.
+        times its radius Bullet takes it for the earlier point; else that one stays, as a further one, until it is
+        lifted, and its braking in the first iterations is not taken back: a sphere of 35 mm at 0.2 m/s would brake by
+        23 % more than by its rolling friction. Contacts ahead of the touch are not processed at all.
         """
         return {**settings_of(self._physics, self._dt), "contactBreakingThreshold": BREAKING_THRESHOLD}
 
@@ -206,7 +206,7 @@ class BulletEngine:
         return made
 
     def _make_jointed(self, body: Body) -> int:
-        """Make a jointed body as a multibody on a fixed base, with limits on what slides."""
+        """Make a jointed body as a multibody on a fixed base, with limits on the link that slides."""
         links = body.links
         count = len(links)
         made: int = p.createMultiBody(
@@ -273,7 +273,7 @@ class BulletEngine:
 
     def _motors_off(self, name: str) -> None:
         chain = self._chains[name]
-        self._told.pop(name, None)
+        self._last_commands.pop(name, None)
         p.setJointMotorControlArray(
             chain.body,
             chain.joints,
@@ -284,13 +284,13 @@ class BulletEngine:
         )
 
     def _wipe(self) -> None:
-        """Forget all contacts: of every pair that can touch one is free, and free bodies far away end their pairs."""
+        """Clear all contacts: every pair that can touch has a free body, and a free body far away ends its pairs."""
         for name, body in self._free.items():
             p.resetBasePositionAndOrientation(body, self._parking[name], UPRIGHT, self._client)
         self._end_pairs()
 
     def _end_pairs(self) -> None:
-        """Let Bullet notice which pairs are no more."""
+        """Let Bullet remove ended pairs."""
         p.performCollisionDetection(physicsClientId=self._client)
 
     def _wake_fetched(self) -> None:
@@ -311,7 +311,7 @@ class BulletEngine:
     # --- the tick ----------------------------------------------------------------------------------------------------
 
     def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
-        """Wipe what the engine remembers and set these bodies to their state; park all others."""
+        """Wipe the engine's memory and set these bodies to their state; park all others."""
         client, reset = self._client, p.resetJointState
         self._wipe()
         chains, free = self._chains, self._free
@@ -359,7 +359,7 @@ class BulletEngine:
         self._loaded_free.append(entity.name)
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
-        """Set the motors of these robots: for each joint what a `drives.Motor` has.
+        """Set the motors of these robots: for each joint the numbers of a `drives.Motor`.
 
         Bullet sorts motors by island, unstably. That reorders nothing where the joints of a body do not couple.
         """
@@ -371,18 +371,18 @@ class BulletEngine:
                 if len(motors) == len(motors[0]) == len(motors[1]) == 2:  # takes a third of what zip does
                     (one, force), (other, torque) = motors
                     speeds, forces = (one, other), (force, torque)
-                    asked = _of_two_joints(one, other, force, torque)
+                    packed = _of_two_joints(one, other, force, torque)
                 elif any(len(motor) > 2 for motor in motors):
                     self._govern(name, chain, [Motor(*motor) for motor in motors])
                     continue
                 else:
                     speeds, forces = zip(*motors, strict=True)
-                    asked = b""
-                if not asked or self._told.get(name) != asked:
+                    packed = b""
+                if not packed or self._last_commands.get(name) != packed:
                     drive(
                         chain.body, chain.joints, mode, targetVelocities=speeds, forces=forces, physicsClientId=client
                     )
-                    self._told[name] = asked
+                    self._last_commands[name] = packed
                 if 0.0 in forces:
                     self._slack[name] = [place for joint, _, _, place in chain.places if forces[joint] == 0.0]
         self._idle.difference_update([entity.name for entity in entities])
@@ -390,10 +390,10 @@ class BulletEngine:
     def _govern(self, name: str, chain: Chain, motors: Sequence[Motor]) -> None:
         """Set motors whose forces fall with the speed.
 
-        Whether a free body can touch this one within the tick, or a joint come to its end, follows from the frame
-        alone: it is the same whoever else is loaded.
+        Whether a free body can touch this one within the tick, or a joint reach its end, follows from the frame alone,
+        independent of other loaded bodies.
         """
-        self._told.pop(name, None)
+        self._last_commands.pop(name, None)
         forces: Sequence[float] = [motor.force for motor in motors]
         gains = [share_of(motor.slope, load, self._dt) for motor, load in zip(motors, chain.loads, strict=True)]
         if name in self._stops or self._may_be_touched(chain):
@@ -464,7 +464,7 @@ class BulletEngine:
                     self._note(jointed, link, place, name, impulse, substep)
 
     def _note(self, jointed: str, link: int, point: Vector, free: str, impulse: float, substep: int) -> None:
-        """Note which link of a jointed body a free one touches, and where along the axis of the first joint."""
+        """Note the link of a jointed body that a free one touches, and the place along the axis of the first joint."""
         chain = self._chains[jointed]
         along = sum([(a - b) * c for a, b, c in zip(point, self._bases[jointed], chain.axis, strict=True)])
         slid = p.getJointState(chain.body, 0, self._client)[0] if chain.slides else 0.0
@@ -503,7 +503,7 @@ class BulletEngine:
             if detailed and name in detailed:
                 self._details.get(name, NO_TOUCHES).write(entity, state, self._substeps)
             if slack and name in slack:
-                for place in slack[name]:  # without a force Bullet keeps what a motor applied last
+                for place in slack[name]:  # without a force Bullet keeps the last effort of a motor
                     state[place] = 0.0
             if governed and name in governed:
                 for number, force in zip(governed[name].numbers, governed[name].efforts, strict=True):

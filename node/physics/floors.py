@@ -1,5 +1,5 @@
 """Floors: wide upright boxes of scenery. To bodies above one, away from its edges, it is a plane: contacts with planes
-cost a tenth of a solve less. Whatever is not above it at the start of a tick, or near its edges, meets the box."""
+cost a tenth of a solve less. A body below it at the start of a tick, or near its edges, meets the box."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from foosim.world.layout import Entity
 from foosim.world.scene import UPRIGHT, Body, Box, Shape, Vector, moved, swept_box
 
 EDGE_M: Final = 1.0
-"""How far all of a body is from a floor's edges, at least. What goes farther in a tick is carried until its end."""
+"""The least distance of a body from a floor's edges (m). It is carried until the tick's end if it moves farther."""
 THICKNESS_MIN_M: Final = 0.05
 SUNK_M: Final = 0.001
-"""By how much the middle of a body that lies on a floor may be below its surface: that of a thin one is."""
+"""The tolerance by which the middle of a thin body that lies on a floor may be below its surface (m)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,16 +24,16 @@ class Plane:
 
 
 Floor: TypeAlias = tuple[int, float, float, float, float, float]
-"""Its place in the scenery, the middle and the half sides of where bodies may be, x and y, and its upper side."""
+"""Its place in the scenery, the middle and the half sides of its area for bodies, x and y, and its upper side."""
 
 
 class Floors:
-    """The floors among some scenery, and which of them bodies are above."""
+    """The floors among some scenery, and a test of bodies above them."""
 
     def __init__(self, scenery: Sequence[Shape], bodies: Iterable[tuple[Entity, Body]]) -> None:
         self._floors = [floor for number, shape in enumerate(scenery) for floor in _floors(number, shape)]
         self._free: dict[int, tuple[int, float]] = {}
-        """Of each free body where its position is in a frame, and its radius."""
+        """Of each free body the place of its position in a frame, and its radius."""
         self._fixed: dict[int, tuple[Vector, float]] = {}
         for entity, body in bodies:
             if body.is_free:
@@ -70,7 +70,7 @@ def _floors(number: int, shape: Shape) -> list[Floor]:
 
 
 def as_plane(floor: Shape) -> Shape:
-    """Return the plane that a floor's upper side is in."""
+    """Return the plane of a floor's upper side."""
     assert isinstance(floor.geometry, Box)
     top = moved(floor.position, (0.0, 0.0, 1.0), floor.geometry.half[2])
     return replace(floor, geometry=Plane(), position=top)  # type: ignore[arg-type]

@@ -1,11 +1,11 @@
-"""The interface of a physics engine to a node: load, command, step, read; and of what makes one.
+"""The interface of a physics engine to a node: load, command, step, read.
 
-An engine holds the bodies of one layout and the scenery, and remembers nothing that matters: every tick starts with a
-complete load of what is solved, from the frame. Its bodies are the scene's bodies of those entities that are rigid
+An engine holds the bodies of one layout and the scenery, and keeps no state: every tick starts with a complete load of
+the solved bodies from the frame. Its bodies are the scene's bodies of those entities that are rigid
 (`Entity.is_rigid`).
 
 An `IslandEngine` solves bodies of any kind, an island at a time. An `Engine` solves all bodies in one go, and parks
-what is not loaded: *free* ones are one link each, a sphere; *jointed* ones are chains of two links on a fixed base.
+the others: *free* ones are one link each, a sphere; *jointed* ones are chains of two links on a fixed base.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class Weld(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Island:
-    """Bodies that an engine solves together, in name order, what is asked of each, the movers in their way, and which
-    of the bodies hold which."""
+    """Bodies that an engine solves together, in name order, the set-points of each, the movers in their way, and the
+    welds of held bodies."""
 
     bodies: tuple[Entity, ...]
     movers: tuple[Entity, ...]
@@ -52,18 +52,18 @@ class IslandEngine(Protocol):
         """
 
     def close(self) -> None:
-        """Free what the engine holds. It is not used afterwards."""
+        """Free the engine's memory and clients. It is not used afterwards."""
 
 
 class Engine(Protocol):
     """One physics engine with the bodies of `layout`. `state` is always the whole frame's numbers, in layout order."""
 
     def load(self, entities: Sequence[Entity], state: Sequence[float]) -> None:
-        """Wipe what the engine remembers and set these bodies (those with a body) to their state; park all others."""
+        """Wipe the engine's memory and set these entities, where they have a body, to their state; park all others."""
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
         """Set the motors of these robots: for each joint the target speed and the greatest force (SI units), and maybe
-        by how much the force falls with the speed (`drives.Motor`)."""
+        the slope by which the force falls with the speed (`drives.Motor`)."""
 
     def step(self, substeps: int) -> None:
         """Advance the loaded bodies by `substeps` substeps and log their contacts."""
@@ -71,11 +71,11 @@ class Engine(Protocol):
     def read(self, entities: Sequence[Entity], state: list[float]) -> None:
         """Write position, velocity and the tick's contact log of these bodies into `state`.
 
-        Of each joint, too, what its motor applied in the last substep: a force (N) or a torque (N m).
+        Also the effort of each joint's motor in the last substep: a force (N) or a torque (N m).
         """
 
     def close(self) -> None:
-        """Free what the engine holds. It is not used afterwards."""
+        """Free the engine's memory and clients. It is not used afterwards."""
 
 
 AnyEngine: TypeAlias = Engine | IslandEngine

@@ -1,8 +1,8 @@
-"""What Bullet is told of joints at each substep: forces of motors that fall with the speed, and stops at once.
+"""Commands of joints for Bullet at each substep: forces of motors that fall with the speed, and hard stops.
 
-Where nothing touches a body, a motor of Bullet with a gain has the force of such a motor (`drives.share_of`), without a
-call a substep. In a contact and at a stop it has not: the solver gives it whatever force restores the speed that these
-take, up to its greatest, while the force of a real one follows the speed that there was.
+Without contacts a motor of Bullet with a gain has the force of such a motor (`drives.share_of`), without a call a
+substep. In a contact and at a stop it has another one: the solver applies the force that restores the lost speed, up to
+the greatest, while the force of a real motor follows the actual speed.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class MotorForces:
         ends: Sequence[tuple[float, float]],
         substep_s: float,
     ) -> None:
-        """`joints` are their indices in Bullet, `loads` what each motor accelerates (`scene.load_of`), `ends` what
-        limits each joint."""
+        """`joints` are their indices in Bullet, `loads` those of the motors (`scene.load_of`), `ends` the limits of
+        the joints."""
         self._client, self._body = client, body
         self.numbers = [number for number, motor in enumerate(motors) if motor.slope != inf]
         self._joints = [joints[number] for number in self.numbers]
@@ -57,7 +57,7 @@ class MotorForces:
     def apply(self) -> None:
         """Set the forces of the next substep; Bullet forgets them after it.
 
-        The mean over a substep is that of an unloaded joint. One that is pressed against its stop does not move.
+        The mean over a substep is that of an unloaded joint. A joint that is pressed against its stop does not move.
         """
         efforts = []
         states = p.getJointStates(self._body, self._joints, self._client)
@@ -72,14 +72,14 @@ class MotorForces:
 
 
 def without_sloping(motors: Sequence[Motor]) -> list[float]:
-    """Return the greatest forces of Bullet's own motors: 0 of those whose forces are set at each substep."""
+    """Return the greatest forces of Bullet's own motors: 0 where the force is set at each substep."""
     return [motor.force if motor.slope == inf else 0.0 for motor in motors]
 
 
 class Stops:
-    """Ends of a body's joints where they stop dead, as told after each substep.
+    """Hard stops of a body's joints, applied after each substep.
 
-    Bullet's own limit acts on a joint that is beyond it already, by up to the speed times a substep, and throws it
+    Bullet's own limit acts on a joint beyond it, by up to the speed times a substep, and throws it
     back.
     """
 
@@ -109,6 +109,6 @@ def ends_of(body: Body) -> list[tuple[float, float]]:
 
 
 def may_stop(ends: tuple[float, float], position: float, speed: float, tick_s: float) -> bool:
-    """Whether a joint may come to an end within a tick: with its speed, and what motors and contacts add."""
+    """Whether a joint may reach an end within a tick: with its speed, and the effect of motors and contacts."""
     reach = (abs(speed) + ADDED_SPEED) * tick_s
     return not ends[0] + reach < position < ends[1] - reach

@@ -1,4 +1,4 @@
-"""The engine of a deployment, by its name in the registry. Its implementation is imported when it is made."""
+"""The engine of a deployment, by its name in the registry. Its implementation is imported when it is built."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def has_rigid(layout: Layout) -> bool:
 
 
 def engine_of(deployment: Deployment, layout: Layout) -> AnyEngine:
-    """Return an engine of the kind that a deployment names, built at once."""
+    """Return the engine that a deployment names, built at once."""
     engine: AnyEngine = registry.class_at(deployment.engine_type.path)(deployment, layout)
     return engine
 

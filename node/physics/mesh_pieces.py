@@ -1,5 +1,5 @@
-"""Scenery of triangles for an engine of convex shapes: thin prisms, in pieces, of which an island has those in its
-reach."""
+"""Scenery of triangles for an engine of convex shapes: thin prisms, in pieces, of which an island has the near
+ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from foosim.world.scene import Hull, Shape, rotate
 
 PIECE_TRIANGLES: Final = 32
 THICKNESS_M: Final = 0.005
-"""Of a prism, behind its triangle: contacts begin at the triangle, from behind at most this far from it."""
+"""The thickness of a prism behind its triangle (m): contacts begin at the triangle, or within this from its back."""
 AREA_MIN_M2: Final = 1e-10
 """Smaller triangles are left out: a body does not rest on these."""
 
@@ -53,7 +53,7 @@ class MeshPieces:
 
 
 def _in_the_world(shape: Shape, mesh: Mesh) -> Floats:
-    """Return the corners of triangles, shape (n, 3, 3), of those that are large enough."""
+    """Return the corners of all triangles that are large enough, shape (n, 3, 3)."""
     axes = [rotate(shape.orientation, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     x, y, z = (mesh.vertices[:, number, None] * np.array(axis) for number, axis in enumerate(axes))
     corners: Floats = (x + y + z + np.array(shape.position))[mesh.triangles]

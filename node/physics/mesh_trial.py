@@ -1,9 +1,9 @@
-"""Meshes of the scenery meet Bullet in a throw-away process first, and only then in one that matters.
+"""Trials of the scenery's meshes with the engine in a throw-away process, before a run.
 
-What Python can check is checked before (`world.mesh_files`); what is left is that Bullet may crash, hang or use up the
+`world.mesh_files` has checked the files before; but Bullet may still crash, hang or use up the
 memory. The throw-away process has 1 GiB of address space, 5 s of processor time for each, and can open nothing. It
-builds the world with one mesh alone, lets a free body fall on it and start inside of it, 100 ticks in all. If it ends
-in any other way than well, the run does not begin, and the message says which file did it. A process that rehearses a
+builds the world with one mesh alone, lets a free body fall on it and start inside of it, 100 ticks in all. If it
+fails, the run does not begin, and the message names the file. A process that rehearses a
 world several times tries it once.
 """
 
@@ -37,15 +37,15 @@ TICKS: Final = 100
 CPU_S: Final = 5
 ADDRESS_SPACE_BYTES: Final = 1 << 30
 WALL_S: Final = 300.0
-"""Processor time is what is limited; this is for a process that sleeps."""
+"""The limit of wall time, for a process that sleeps."""
 DONE: Final = "done"
 _passed: Final = deque[bytes](maxlen=100)
-"""The last worlds that this process has seen pass, by digest: the engine is deterministic."""
+"""Digests of the last worlds that passed in this process: the engine is deterministic."""
 COMMAND: Final = (sys.executable, "-P", "-m", "foosim.node.physics.mesh_trial")
 
 
 def check_shapes(deployment: Deployment, name: str, text: str) -> None:
-    """Try what an engine makes of somebody's numbers: meshes of scenery, and bodies. Files must have been read.
+    """Try the files of a deployment with its engine: meshes of scenery, and bodies. Files must have been read.
 
     `text` is that of the deployment. Raises AssetError.
     """
@@ -59,7 +59,7 @@ def check_shapes(deployment: Deployment, name: str, text: str) -> None:
 def check_meshes(deployment: Deployment, name: str, text: str, command: Sequence[str] = COMMAND) -> None:
     """Try the meshes of a deployment, whose text is given, with its engine. Its files must have been read.
 
-    Raises AssetError for one that fails.
+    Raises AssetError for a mesh that fails.
     """
     tries = {f"scenery.{thing}": f"{mesh.file}: scenery.{thing}" for thing, mesh in _meshes(deployment).items()}
     if not tries:
@@ -85,13 +85,13 @@ def check_meshes(deployment: Deployment, name: str, text: str, command: Sequence
         _passed.append(world)
         return
     tried = [line for line in lines if line in tries]
-    said = [line for line in lines if line not in tries and line != DONE]
+    output = [line for line in lines if line not in tries and line != DONE]
     where = tries[tried[-1]] if tried else f"{name}: its shapes"
-    raise AssetError(f"{where} failed its trial with the engine {deployment.engine}: {_reason(code, said)}")
+    raise AssetError(f"{where} failed its trial with the engine {deployment.engine}: {_reason(code, output)}")
 
 
 def _digest(deployment: Deployment, command: Sequence[str]) -> bytes:
-    """Return a digest of what a trial depends on: the world without its sensors and nodes, and its files."""
+    """Return a digest of the inputs of a trial: the world without its sensors and nodes, and its files."""
     world = {field: getattr(deployment, field) for field in WorldSpec.model_fields}
     world["robots"] = {name: robot.model_copy(update={"sensors": {}}) for name, robot in deployment.robots.items()}
     found = sha256(repr([command, world]).encode())
@@ -106,9 +106,9 @@ def _meshes(deployment: Deployment) -> dict[str, SceneryMesh]:
     return found if build_layout(deployment).free else {}
 
 
-def _reason(code: int, said: Sequence[str]) -> str:
-    if said:
-        return said[-1]
+def _reason(code: int, output: Sequence[str]) -> str:
+    if output:
+        return output[-1]
     if code in (-signal.SIGXCPU, -signal.SIGALRM):
         return f"it took more than {CPU_S} s of processor time, or {WALL_S:g} s"
     return f"the process was ended by {signal.Signals(-code).name}" if code < 0 else f"the process ended with {code}"
@@ -118,14 +118,14 @@ def _reason(code: int, said: Sequence[str]) -> str:
 
 
 def main() -> None:
-    """Try what standard input holds; say each thing's name before, and in the end that all is done."""
+    """Try the meshes on standard input; print each thing's name before its trial, and `DONE` at the end."""
     report = os.dup(1)
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 1)  # where Bullet prints
     name, text, files = decode_any(tuple[str, str, dict[str, bytes]], sys.stdin.buffer.read())
     deployment = load_deployment(text, name).with_assets(files)
     bare = deployment.model_copy(update={"scenery": {}})
-    engine_of(bare, build_layout(deployment)).close()  # imports what it needs
+    engine_of(bare, build_layout(deployment)).close()  # for its imports
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_NOFILE, 0)
     _limit(resource.RLIMIT_AS, ADDRESS_SPACE_BYTES)
@@ -163,7 +163,7 @@ def _try(deployment: Deployment) -> None:
 
 
 def _radius(body: Body) -> float:
-    """Return how far below its middle a body at rest begins."""
+    """Return the distance from a body's middle down to its lowest point, at rest."""
     return -shape_box(body.links[0].shapes[0])[0][2]
 
 
@@ -175,7 +175,7 @@ def _inside(shape: Shape, mesh: Mesh) -> Vector:
 
 
 def _drop(deployment: Deployment, engine: Engine, body: Entity, numbers: list[float], start: Vector) -> None:
-    """Let a free body, which is at rest in a world's numbers, start from somewhere else."""
+    """Let a free body, which is at rest in a world's numbers, start from another place."""
     at = body.offsets["position"]
     numbers[at : at + 3] = start
     for _ in range(TICKS // 2):
@@ -183,7 +183,7 @@ def _drop(deployment: Deployment, engine: Engine, body: Entity, numbers: list[fl
         engine.step(deployment.substeps)
         engine.read((body,), numbers)
         if not all(isfinite(number) for number in numbers):
-            raise ArithmeticError("a body that touches it is nowhere: its position is not finite")
+            raise ArithmeticError("the position of a body that touches it is not finite")
 
 
 if __name__ == "__main__":

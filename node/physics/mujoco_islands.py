@@ -1,8 +1,8 @@
 """Rigid bodies of any kind in MuJoCo: one island at a time, in a model of its composition (`mujoco_model`).
 
 The state of a model is `qpos` and `qvel`. All else that a step reads is set at each load: the warm start and the time
-are 0, motors, applied forces and the wind those of the tick. So a tick is a function of the frame, whichever model
-computes it and whatever that has computed before.
+are 0, motors, applied forces and the wind those of the tick. So a tick is a function of the frame, independent of
+the model and its past.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ from foosim.world.scene import (
 )
 
 MODELS_MAX: Final = 128
-"""Models that an engine keeps: those that were built last."""
+"""The count of models, the latest ones, that an engine keeps."""
 SEATED_MAX: Final = 1024
-"""Islands whose entities' places in a model are kept: there are more of them than compositions."""
+"""The count of islands with kept places in a model: there are more of them than compositions."""
 NO_CONTACT: tuple[float, ...] = (0.0, 0.0, -1.0)
 
 Composition = tuple[
@@ -158,7 +158,7 @@ class MujocoIslands:
 
 
 class _Seat:
-    """A body of a model, and where the numbers of the entity that sits there now are in a frame (-1: it has none)."""
+    """A body of a model, and the places of its present entity's numbers in a frame (-1: none)."""
 
     __slots__ = (
         "contacts", "index", "joint_efforts", "joint_positions", "joint_velocities", "orientation", "partner_impulses",
@@ -178,12 +178,12 @@ class _Seat:
 class Seats:
     """The entities of an island in a model, in the order of its bodies, movers last."""
 
-    __slots__ = ("bodies", "everybody", "fixed", "grasps", "movers", "q", "turned", "v")
+    __slots__ = ("bodies", "fixed", "grasps", "movers", "q", "seats", "turned", "v")
 
     def __init__(self, m: Any, places: Sequence[Placed], island: Island, bodies: Sequence[Body]) -> None:
-        self.everybody = [_Seat(*its) for its in zip(places, (*island.bodies, *island.movers), strict=True)]
-        self.bodies = self.everybody[: len(island.bodies)]
-        everything = list(zip(self.everybody, (*island.bodies, *island.movers), bodies, strict=True))
+        self.seats = [_Seat(*its) for its in zip(places, (*island.bodies, *island.movers), strict=True)]
+        self.bodies = self.seats[: len(island.bodies)]
+        everything = list(zip(self.seats, (*island.bodies, *island.movers), bodies, strict=True))
         self.movers = [its for its in everything if its[0].placed.is_mover]
         self.fixed = [(seat.placed, body) for seat, _, body in everything if not body.is_free]
         self.grasps = [one.grasp for one in island.welds]
@@ -191,7 +191,7 @@ class Seats:
         self.turned: list[tuple[int, int]] = []
         """Of each free body the first places of its angular velocity in `qvel` and of its orientation in the frame."""
         self.q, self.v = [0] * m.nq, [0] * m.nv
-        """Where the frame has what `qpos` and `qvel` are; of movers and the clock, which are set apart, 0."""
+        """The places of `qpos` and `qvel` in the frame; 0 of movers and the clock, which are set separately."""
         for seat in self.bodies:
             placed = seat.placed
             if placed.is_free:
@@ -251,11 +251,11 @@ class CompositionEngine:
             self._friction, self._speeds = self.m.tendon_frictionloss, self.m.wrap_prm[1::2]
 
     def seats_of(self, island: Island, bodies: Sequence[Body]) -> Seats:
-        """Return which of an island's entities, movers last, with their bodies, is which body of the model."""
+        """Return the seats of an island's entities, movers last, with their bodies, in the model."""
         return Seats(self.m, self._placed, island, bodies)
 
     def blow(self, velocity: Sequence[float]) -> None:
-        """Set how fast the air goes (m/s), until it is set anew."""
+        """Set the velocity of the air (m/s), until it is set anew."""
         self._wind[:] = velocity
 
     def solve(self, seats: Seats, drives: Sequence[Drives], numbers: list[float], start: Sequence[float]) -> None:
@@ -265,7 +265,7 @@ class CompositionEngine:
         self.read(numbers)
 
     def load(self, seats: Seats, drives: Sequence[Drives], numbers: Sequence[float], start: Sequence[float]) -> None:
-        """Set the bodies of an island to their state, and movers to where they are at the start of the tick."""
+        """Set the bodies of an island to their state, and movers to their poses at the start of the tick."""
         self._seated = seats
         qpos, qvel = [numbers[at] for at in seats.q], [numbers[at] for at in seats.v]
         for v, at in seats.turned:
@@ -278,8 +278,8 @@ class CompositionEngine:
             qpos[q : q + 7] = *start[at : at + 3], w, x, y, z
             qvel[v : v + 6] = *linear, *rotate((-x, -y, -z, w), spin)
         for placed, body in seats.fixed:
-            if placed.stands is not body:
-                self._stand(placed, body)
+            if placed.fixed_at is not body:
+                self._place_base(placed, body)
         for (number, origin, axes), grasp in zip(self._welds, seats.grasps, strict=True):
             self._weld(number, origin, axes, numbers[grasp : grasp + 7])
         if self._motors:
@@ -289,10 +289,10 @@ class CompositionEngine:
         self._warm.fill(0.0)
         self.d.time = 0.0
 
-    def _stand(self, placed: Placed, body: Body) -> None:
-        """Put the fixed base of a body of the same kind where this one has it."""
+    def _place_base(self, placed: Placed, body: Body) -> None:
+        """Put the fixed base of a body of the same kind to the place of this one's."""
         x, y, z, w = body.orientation
-        placed.stands = body
+        placed.fixed_at = body
         self.m.body_pos[placed.base], self.m.body_quat[placed.base] = body.position, (w, x, y, z)
 
     def _weld(self, number: int, origin: Vector, axes: Quaternion, grasp: Sequence[float]) -> None:
@@ -302,11 +302,11 @@ class CompositionEngine:
         place = moved(origin, rotate(axes, (px, py, pz)), 1.0)
         self.m.eq_data[number, :10] = *ORIGIN, *place, w, x, y, z
 
-    def _command(self, everybody: Sequence[Drives]) -> None:
+    def _command(self, all_drives: Sequence[Drives]) -> None:
         """Set the target speeds of motors, and the greatest forces with which they are reached."""
         speeds, forces = [0.0] * self._motors, [0.0] * self._motors
         self._governed.clear()
-        for placed, drives in zip(self._placed, everybody, strict=False):
+        for placed, drives in zip(self._placed, all_drives, strict=False):
             for number, motor in enumerate(drives.motors, placed.motor):
                 if motor.slope != inf:
                     self._govern(placed, number - placed.motor, motor)
@@ -321,13 +321,13 @@ class CompositionEngine:
         load = load_of(placed.body, link)
         self._governed.append((placed, number, motor, share_of(motor.slope, load, self._dt) * load / self._dt))
 
-    def step(self, everybody: Sequence[Drives]) -> None:
-        """Advance by the substeps of a tick and note what touches."""
+    def step(self, all_drives: Sequence[Drives]) -> None:
+        """Advance by the substeps of a tick and note contacts."""
         m, d, touches = self.m, self.d, self._touches
         touches.clear()
         pushed = [
             (placed, drives.wrench)
-            for placed, drives in zip(self._placed, everybody, strict=False)
+            for placed, drives in zip(self._placed, all_drives, strict=False)
             if drives.wrench is not None
         ]
         if self._is_applied:
@@ -355,7 +355,7 @@ class CompositionEngine:
         """Note the contacts of a substep that push."""
         contact, owners, touches = self._contact, self._owners, self._touches
         forces = self.d.efc_force.tolist()
-        forces.append(0.0)  # of what does not push, whose row is -1
+        forces.append(0.0)  # of contacts without a force, whose row is -1
         for (one, other), row in zip(contact.geom.tolist(), contact.efc_address.tolist(), strict=True):
             force = forces[row]
             if force > 0.0:
@@ -368,7 +368,7 @@ class CompositionEngine:
                 touch.substeps |= bit
 
     def read(self, numbers: list[float]) -> None:
-        """Write the state of the island's bodies, and what they touched, into the numbers."""
+        """Write the state of the island's bodies, and their contacts, into the numbers."""
         qpos, qvel = self._qpos.tolist(), self._qvel.tolist()
         efforts = self._efforts() if self._motors else []
         met = self._met()
@@ -390,7 +390,7 @@ class CompositionEngine:
             self._write_log(seat, met.get(number, ()), numbers)
 
     def _efforts(self) -> list[float]:
-        """Return what each motor applied in the last substep (N or N m)."""
+        """Return the force of each motor in the last substep (N or N m)."""
         m, d = self.m, self.d
         rows = slice(d.ne, d.ne + d.nf)
         found: list[float] = d.efc_force[rows].tolist()
@@ -402,7 +402,7 @@ class CompositionEngine:
         return found
 
     def _met(self) -> dict[int, list[tuple[int, _Touch]]]:
-        """Return what each body touched in the tick, by its place: the partner's place, and how."""
+        """Return the contacts of each body in the tick, by its place: the partner's place, and the contact."""
         found: dict[int, list[tuple[int, _Touch]]] = {}
         for (one, other), touch in self._touches.items():
             if one != SILENT:
@@ -411,7 +411,7 @@ class CompositionEngine:
         return found
 
     def _write_log(self, seat: _Seat, met: Sequence[tuple[int, _Touch]], numbers: list[float]) -> None:
-        """Write what a body touched: how many touches began, the impulse (N s), and the last substep with a contact."""
+        """Write the contact log of a body: count of touches that began, impulse (N s), last substep with a contact."""
         at, dt, force, substeps = seat.contacts, self._dt, 0.0, 0
         if met:
             for _, touch in met:
@@ -423,7 +423,7 @@ class CompositionEngine:
             numbers[at : at + 3] = NO_CONTACT
         if seat.partners < 0:
             return
-        seats, at, to = self._seated.everybody, seat.partners, seat.partner_impulses
+        seats, at, to = self._seated.seats, seat.partners, seat.partner_impulses
         found = [(seats[one].index, touch.force * dt) for one, touch in met if one != SCENERY]
         if len(found) > PARTNERS_MAX:
             found = sorted(found, key=lambda its: (-its[1], its[0]))[:PARTNERS_MAX]
@@ -433,4 +433,4 @@ class CompositionEngine:
         numbers[to : to + PARTNERS_MAX] = [impulse for _, impulse in found] + [0.0] * missing
 
     def close(self) -> None:
-        """Nothing is held beyond memory."""
+        """Nothing but memory is held."""

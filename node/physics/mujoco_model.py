@@ -1,14 +1,14 @@
 """Builds the MuJoCo model of a composition: the scenery, the bodies of an island in name order, the movers in its way.
 
-The first link of a free body has its MuJoCo frame at its centre of mass in its principal axes: then `qpos` holds what a
-frame of the world holds, and `qvel` the velocity, with the angular part in the body's own axes.
+The first link of a free body has its MuJoCo frame at its centre of mass in its principal axes: then `qpos` has the
+pose in the world's frame, and `qvel` the velocity, with the angular part in the body's own axes.
 
 A motor (a target speed, and the greatest force with which it is reached) is dry friction against a turning shaft: a
 *clock*, a heavy degree of freedom at 1 rad/s, and for each joint a fixed tendon of length q - speed x clock, whose
 friction loss is the force. A gain actuator with a force range sags under load or chatters.
 
-Contacts are explicit pairs of shapes. They say which shapes meet, and give each pair the product of both sides'
-friction and restitution, where MuJoCo's own rule takes the greater friction.
+Contacts are explicit pairs of shapes. Each pair has the product of both sides' friction and restitution, where
+MuJoCo's own rule takes the greater friction.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ from foosim.world.scene import (
 )
 
 HEAVY: Final = 1e7
-"""Mass (kg) and inertia (kg m2) of what no contact moves: movers, and the clock of motors."""
+"""Mass (kg) and inertia (kg m2) of bodies that no contact moves: movers, and the clock of motors."""
 IMPRATIO: Final = 200.0
-"""Friction is this much stiffer than a contact is normal to it. At 100 a box creeps by 86 um/s on a slope of 15
-degrees, at 200 by 43; at 1000 wheels shake at substeps of 10 ms, and stacks rock."""
+"""The stiffness of friction, as a multiple of the normal stiffness of a contact. At 100 a box creeps by 86 um/s
+on a slope of 15 degrees, at 200 by 43; at 1000 wheels shake at substeps of 10 ms, and stacks rock."""
 NOSLIP: Final = 3
 """Iterations that take creep from friction, where motors may hold another body: 200 g in a grip that is shaken for 10 s
 slips by 0.01 mm, and by 16 mm without."""
@@ -55,23 +55,23 @@ TOLERANCE: Final = 1e-10
 """At 1e-8 wheels that hold each other slip."""
 LINE_SEARCHES: Final = 50
 HARD: Final = (0.0, 0.99, 0.001, 0.5, 2.0)
-"""`solimp` of contacts without restitution: impedance 0 at the touch, 0.99 from an overlap of 1 mm on. Where it begins
-above 0, what slides chatters; where it is narrower, too. A box on the floor sinks in by 0.2 mm, below nine others by
+"""`solimp` of contacts without restitution: impedance 0 at the touch, 0.99 from an overlap of 1 mm on. A sliding
+body chatters where it begins above 0, or is narrower. A box on the floor sinks in by 0.2 mm, below nine others by
 0.9 mm. tests/physics/test_solid_truths.py has the scenes by which the values here were chosen."""
 BOUNCY: Final = (0.999, 0.999, 0.001, 0.5, 2.0)
 BOUNCY_ERP: Final = 0.02
 """The share of an overlap that a substep corrects in a contact with restitution, at most: it adds to the rebound."""
 FRICTION_SUBSTEPS: Final = 12.0
 FRICTION_S_MAX: Final = 0.05
-"""The time constant of friction. MuJoCo's cone couples normal and tangential speeds: with a shorter one what slides
-hops, by 10 mm at 3 m/s with 8 substeps; with a longer one what is slow is braked by less than its friction."""
+"""The time constant of friction. MuJoCo's cone couples normal and tangential speeds: with a shorter one a sliding
+body hops, by 10 mm at 3 m/s with 8 substeps; with a longer one a slow body is braked by less than its friction."""
 SERVO: Final = (0.999, 0.999, 0.001, 0.5, 2.0)
 WELD: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """`solimp` of grasps. Their direct `solref` takes away a slip within a substep: 3 kg on an arm that swings them at
 2 m/s slip by 0.1 mm at substeps of 5 ms, and by 0.3 mm with a time constant of two substeps."""
 LIMIT: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 LEAST: Final = 1e-5
-"""MuJoCo takes no smaller coefficient of friction."""
+"""The smallest coefficient of friction in MuJoCo."""
 GEOMS: Final = {
     Plane: "PLANE",
     Box: "BOX",
@@ -82,18 +82,18 @@ GEOMS: Final = {
     Mesh: "MESH",
 }
 SCENERY: Final = -1
-"""The place of what is no body."""
+"""The place of shapes without a body."""
 SILENT: Final = -2
 """The place of a shape whose contacts are not logged."""
 
 VERSION: Final = f"mujoco {mujoco.__version__}"
 step = mujoco.mj_step
 warnings: Final[list[str]] = []
-"""What MuJoCo has warned of: with a full arena it drops contacts, for one."""
+"""The warnings of MuJoCo, such as contacts dropped in a full arena."""
 
 
 def _warned(text: str) -> None:
-    if not text.startswith("Nan, Inf"):  # of numbers that are not finite, which come into quarantine
+    if not text.startswith("Nan, Inf"):  # of non-finite numbers, whose bodies come into quarantine
         warnings.append(text)
 
 
@@ -106,10 +106,10 @@ def is_mover(body: Body) -> bool:
 
 
 class Placed:
-    """Where a body is in a model: MuJoCo's id of its base, the first places of its free joint in `qpos` and `qvel`
+    """The places of a body in a model: MuJoCo's id of its base, the first places of its free joint in `qpos` and `qvel`
     (-1 without one), the places of its other joints, and the number of its first motor."""
 
-    __slots__ = ("base", "body", "damping", "is_free", "is_mover", "motor", "q", "qs", "stands", "v", "vs")
+    __slots__ = ("base", "body", "damping", "fixed_at", "is_free", "is_mover", "motor", "q", "qs", "v", "vs")
 
     def __init__(self, m: Any, body: Body, number: int, motor: int) -> None:
         self.body, self.base, self.motor = body, m.body(f"b{number}").id, motor
@@ -120,15 +120,15 @@ class Placed:
         ids = [m.joint(f"b{number}.{index}").id for index in moving]  # by name: MuJoCo numbers them depth first
         self.qs, self.vs = [int(m.jnt_qposadr[one]) for one in ids], [int(m.jnt_dofadr[one]) for one in ids]
         self.damping = [body.links[index].damping for index in moving]
-        self.stands: Body | None = None
+        self.fixed_at: Body | None = None
         """The body whose fixed base the model has now."""
 
 
 class ModelBuilder:
     """Builds one model and its data, `m` and `d`.
 
-    `placed` says where its bodies are, `owners` whose shape each geom is: the place of the body, `SCENERY` of the
-    scenery, `SILENT` of what is not logged. `clock` is the place of the clock in `qvel`, -1 without motors.
+    `placed` has the places of its bodies, `owners` the owner of each geom: the place of the body, `SCENERY` of the
+    scenery, `SILENT` of shapes without a log. `clock` is the place of the clock in `qvel`, -1 without motors.
     """
 
     def __init__(
@@ -144,21 +144,21 @@ class ModelBuilder:
         self._spec = mujoco.MjSpec()
         self._meshes: dict[int, str] = {}
         self._shapes: list[tuple[str, int, Side, bool]] = []
-        """Of each geom its name, the place of its body, its side of contacts, and whether it stands still."""
+        """Of each geom its name, the place of its body, its side of contacts, and whether it is fixed."""
         self._joints: list[str] = []
         self._touching: dict[str, set[int]] = {}
         """Of shapes beside a grip the places of the bodies that are held there: they do not meet."""
         self._holding = _holding((*bodies, *movers), welds)
         self._set_options()
         for shape in scenery:
-            self._add_shape(self._spec.worldbody, shape, SCENERY, ORIGIN, UPRIGHT, stands=True)
-        everybody = (*bodies, *movers)
-        for number, body in enumerate(everybody):
+            self._add_shape(self._spec.worldbody, shape, SCENERY, ORIGIN, UPRIGHT, is_fixed=True)
+        all_bodies = (*bodies, *movers)
+        for number, body in enumerate(all_bodies):
             self._add_body(number, body)
-        held = [self._add_weld(everybody[holder], holder, link, held) for holder, link, held in welds]
+        held = [self._add_weld(all_bodies[holder], holder, link, held) for holder, link, held in welds]
         if self._joints:
             self._add_motors()
-            self._spec.option.noslip_iterations = NOSLIP if len(everybody) > 1 else 0
+            self._spec.option.noslip_iterations = NOSLIP if len(all_bodies) > 1 else 0
         self._add_pairs()
         self.m = m = self._spec.compile()
         self.d = mujoco.MjData(m)
@@ -166,7 +166,7 @@ class ModelBuilder:
         m.stat.meaninertia = float(light.mean()) if len(light) else 1.0  # scales the solver's tolerance
         self.placed: list[Placed] = []
         motor = 0
-        for number, body in enumerate(everybody):
+        for number, body in enumerate(all_bodies):
             self.placed.append(Placed(m, body, number, motor))
             motor += len(self.placed[-1].qs)
         self.motors = motor
@@ -188,7 +188,7 @@ class ModelBuilder:
         compiler.degree, compiler.usethread, compiler.inertiafromgeom = False, False, 0
 
     def _add_shape(
-        self, parent: Any, shape: Shape, place: int, at: Vector, turned: Quaternion, *, stands: bool
+        self, parent: Any, shape: Shape, place: int, at: Vector, turned: Quaternion, *, is_fixed: bool
     ) -> None:
         """Add a shape of a link whose frame has the pose (`at`, `turned`) in the frame of MuJoCo's body."""
         geometry = shape.geometry
@@ -196,7 +196,7 @@ class ModelBuilder:
         geom.name = f"g{len(self._shapes)}"
         geom.type = getattr(mujoco.mjtGeom, f"mjGEOM_{GEOMS[type(geometry)]}")
         if isinstance(geometry, Plane):
-            geom.size = 1.0, 1.0, 1.0  # of how it is drawn
+            geom.size = 1.0, 1.0, 1.0  # by its looks
         elif isinstance(geometry, Box):
             geom.size = geometry.half
         elif isinstance(geometry, Sphere):
@@ -208,7 +208,7 @@ class ModelBuilder:
         geom.pos = moved(at, rotate(turned, shape.position), 1.0)
         geom.quat = _wxyz(multiply(turned, shape.orientation))
         geom.contype = geom.conaffinity = 0
-        self._shapes.append((geom.name, place, self._physics.sides[shape.surface], stands))
+        self._shapes.append((geom.name, place, self._physics.sides[shape.surface], is_fixed))
 
     def _mesh(self, mesh: Mesh) -> str:
         name = self._meshes.get(id(mesh))
@@ -230,12 +230,12 @@ class ModelBuilder:
         for index, link in enumerate(body.links):
             at, turned = ORIGIN, UPRIGHT
             if is_free and index == 0:
-                made, stands = base, False
+                made, is_fixed = base, False
                 base.add_freejoint().name = root
                 turned = conjugate(link.principal)
                 at = rotate(turned, moved(ORIGIN, link.centre_of_mass, -1.0))
             else:
-                parent, p_at, p_turned, stands = (
+                parent, p_at, p_turned, is_fixed = (
                     parents[link.parent] if link.parent >= 0 else (base, ORIGIN, UPRIGHT, True)
                 )
                 made = parent.add_body()
@@ -244,7 +244,7 @@ class ModelBuilder:
                 made.quat = _wxyz(multiply(p_turned, link.orientation))
                 if link.joint in MOVING and not moves_alone:
                     self._add_joint(made, link, made.name)
-                    stands = False
+                    is_fixed = False
             if moves_alone:
                 made.gravcomp = 1.0
                 if index == 0:
@@ -253,9 +253,9 @@ class ModelBuilder:
                 made.explicitinertial, made.mass, made.inertia = True, link.mass, link.inertia
                 if made is not base:
                     made.ipos, made.iquat = link.centre_of_mass, _wxyz(link.principal)
-            parents.append((made, at, turned, stands))
+            parents.append((made, at, turned, is_fixed))
             for shape in link.shapes:
-                self._add_shape(made, shape, number, at, turned, stands=stands)
+                self._add_shape(made, shape, number, at, turned, is_fixed=is_fixed)
                 if (number, index) in self._holding:
                     self._touching[self._shapes[-1][0]] = self._holding[number, index]
 
@@ -298,13 +298,13 @@ class ModelBuilder:
     def _add_pairs(self) -> None:
         known: dict[tuple[Side, Side], tuple[Any, ...]] = {}
         count = self._count
-        for number, (one, place, side, stands) in enumerate(self._shapes):
-            is_loose = place < count and not stands
-            for other, place2, side2, stands2 in self._shapes[number + 1 :]:
+        for number, (one, place, side, is_fixed) in enumerate(self._shapes):
+            is_loose = place < count and not is_fixed
+            for other, place2, side2, is_fixed2 in self._shapes[number + 1 :]:
                 # One of both is a body's, and it moves; parts of one body do not meet.
-                if place == place2 or not (is_loose or (place2 < count and not stands2)):
+                if place == place2 or not (is_loose or (place2 < count and not is_fixed2)):
                     continue
-                if (place >= count and stands2) or (place2 >= count and stands):
+                if (place >= count and is_fixed2) or (place2 >= count and is_fixed):
                     continue
                 if place2 in self._touching.get(one, ()) or place in self._touching.get(other, ()):
                     continue
@@ -340,8 +340,8 @@ class ModelBuilder:
 
 
 def _holding(bodies: Sequence[Body], welds: Sequence[tuple[int, int, int]]) -> dict[tuple[int, int], set[int]]:
-    """Return which bodies are held beside which links, by places and indices: by the link that holds, by what is fixed
-    to it, and by what hangs on these, its fingers."""
+    """Return the held bodies beside links, by places and indices: beside the link that holds, the links fixed to it,
+    and the links that hang on these, its fingers."""
     found: dict[tuple[int, int], set[int]] = {}
     for holder, grip, held in welds:
         links, first = bodies[holder].links, grip
@@ -361,7 +361,7 @@ def _wxyz(q: Quaternion) -> tuple[float, float, float, float]:
 
 
 def without_names(body: Body) -> Body:
-    """Return what a model is made of: links without names and looks; a mover has no masses."""
+    """Return the parts of a model: links without names and looks; a mover has no masses."""
     moves_alone, black = is_mover(body), (0.0, 0.0, 0.0, 1.0)
     links = []
     for link in body.links:

@@ -1,7 +1,7 @@
-"""Spheres and shafts of the pure engine: what they are, how they move freely, how a contact changes them.
+"""Spheres and shafts of the pure engine: their data, their free motion, their contacts.
 
-Within a substep a sphere flies the exact parabola and a shaft follows its motors; what then overlaps is put right as if
-the contact had happened at its time within the substep. For one contact with a plane that is exact: the rebound has the
+Within a substep a sphere flies the exact parabola and a shaft follows its motors; an overlap is then resolved as if the
+contact had happened at its time within the substep. For one contact with a plane that is exact: the rebound has the
 pair's restitution and energy never grows. Sources: textbook impulse dynamics with Coulomb friction; rolling friction as
 a length rho gives a = 5/7 rho g / r. Plain floats and one spelling of sin, cos and sqrt: this is the hot path.
 """
@@ -17,12 +17,12 @@ from foosim.world.components.drives import share_of
 from foosim.world.matter.physics import Contact
 from foosim.world.scene import Body, Sphere, Vector, inertia_about_axis
 
-# Not Final: compiled by mypyc 2.4, a Final tuple of so many floats counts as not set.
+# Not Final: compiled by mypyc 2.4, a Final tuple of this many floats counts as not set.
 ALONG_Y: Vector = (0.0, 1.0, 0.0)
 BOUNCE_SPEED_MIN: Final = 0.05
 """Slower contacts do not bounce (m/s): a sphere comes to rest."""
 REST_SPEED: Final = 1e-9
-"""A sphere that rolling friction has slowed to this (m/s) stands still."""
+"""A sphere that rolling friction has slowed to this (m/s) is at rest."""
 
 
 class Log:
@@ -43,7 +43,7 @@ class Log:
 
 
 class FreeSphere:
-    """A free body: position, velocity and spin in the world frame. `travel` is how far it can reach within a tick."""
+    """A free body: position, velocity and spin in the world frame. `travel` is its reach within a tick (m)."""
 
     __slots__ = (
         "gravity", "inertia", "log", "mass", "name", "radius", "travel", "vx", "vy", "vz", "wx", "wy", "wz", "x", "y",
@@ -106,8 +106,8 @@ class FreeSphere:
 class Shaft:
     """A jointed body of two links, of which one slides along y, and the other, on it, turns about y.
 
-    Each has a motor of limited force; the slide stops dead at its stroke. What a motor gave in the last substep is its
-    `push` (a change of speed), which the `scale` makes a force.
+    Each has a motor of limited force; the slide stops dead at its stroke. The last substep of a motor is its `push`
+    (a change of speed), which the `scale` turns into a force.
     """
 
     __slots__ = (
@@ -156,13 +156,13 @@ class Shaft:
         self.slide_share = self.slide_stall = self.spin_share = 1.0
         self.log = Log(False)
         self.touches: TouchLog | None = None
-        """Of a shaft that logs who touches which of its links; None of any other."""
+        """The log of touches of a shaft that has one; None without."""
 
     def drive(self, slide: Sequence[float], spin: Sequence[float]) -> None:
-        """Set what is asked of both motors for this tick (`drives.Motor`).
+        """Set the set-points of both motors for this tick (`drives.Motor`).
 
-        Of a force that falls with the speed `slide_share` is what it takes from the difference as the mean over a
-        substep, `slide_stall` what it would if the speed stayed.
+        Of a force that falls with the speed `slide_share` is the mean share of the difference that it takes away in a
+        substep, `slide_stall` the share at a constant speed.
         """
         self.slide_motor, self.slide_force = slide[0], slide[1]
         self.spin_motor, self.spin_force = spin[0], spin[1]
@@ -238,7 +238,7 @@ def rebound(u: float, depth: float, pull: float, restitution: float, dt: float) 
 def meet_scenery(
     sphere: FreeSphere, nx: float, ny: float, nz: float, depth: float, pair: Contact, restitution: float, dt: float
 ) -> float:
-    """Let a sphere that is `depth` inside something immovable rebound; return the normal impulse."""
+    """Let a sphere that is `depth` inside an immovable shape rebound; return the normal impulse."""
     u = sphere.vx * nx + sphere.vy * ny + sphere.vz * nz
     if u >= 0.0:
         sphere.x += depth * nx
@@ -269,10 +269,10 @@ def meet_scenery(
 def meet_shaft(sphere: FreeSphere, shaft: Shaft, normal: Vector, depth: float, pair: Contact) -> float:
     """Let a sphere and a shaft that overlap by `depth` part, both recoiling; return the normal impulse.
 
-    `normal` points from the shaft to the sphere. Both change by what the impulse would have moved them since they met.
+    `normal` points from the shaft to the sphere. Both move by the effect of the impulse since they met.
     """
     nx, ny, nz = normal
-    # From the axis to the contact, and how fast the normal there moves per turning speed of the shaft.
+    # From the axis to the contact, and the speed of the normal there per turning speed of the shaft.
     rx, rz = sphere.x - sphere.radius * nx - shaft.x, sphere.z - sphere.radius * nz - shaft.z
     arm = rz * nx - rx * nz
     u = sphere.vx * nx + (sphere.vy - shaft.slide_speed) * ny + sphere.vz * nz - shaft.angle_speed * arm
@@ -294,7 +294,7 @@ def meet_shaft(sphere: FreeSphere, shaft: Shaft, normal: Vector, depth: float, p
 
 
 def _part(sphere: FreeSphere, shaft: Shaft, normal: Vector, arm: float, shift: float) -> None:
-    """Move sphere and shaft apart by what an impulse moves them: `shift` is a length times a mass."""
+    """Move sphere and shaft apart by the effect of an impulse: `shift` is a length times a mass."""
     nx, ny, nz = normal
     sphere.x += shift / sphere.mass * nx
     sphere.y += shift / sphere.mass * ny
@@ -333,7 +333,7 @@ def yield_shaft(sphere: FreeSphere, shaft: Shaft, normal: Vector, depth: float) 
     rx, rz = sphere.x - sphere.radius * nx - shaft.x, sphere.z - sphere.radius * nz - shaft.z
     arm = rz * nx - rx * nz
     give = ny * ny / shaft.mass + arm * arm / shaft.inertia
-    if give * sphere.mass < 1e-3:  # it presses along a direction in which a shaft does not give
+    if give * sphere.mass < 1e-3:  # it presses along a direction in which a shaft is fixed
         return
     shaft.move(-depth / give * ny / shaft.mass, -depth / give * arm / shaft.inertia)
     u = sphere.vx * nx + (sphere.vy - shaft.slide_speed) * ny + sphere.vz * nz - shaft.angle_speed * arm

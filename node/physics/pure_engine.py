@@ -1,8 +1,8 @@
 """The pure engine: spheres and shafts in plain Python, for tests and fault simulations by the thousand.
 
 Exact where a test asserts something (rebound, energy, no tunnelling), simple elsewhere: one contact after the other,
-the deepest first. It keeps nothing between ticks but what it was built from, so law 1 holds by construction; the same
-test watches over it as over Bullet.
+the deepest first. It keeps only its built data between ticks, so law 1 holds by construction; the same test
+checks it as Bullet.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from foosim.world.layout import Entity, Layout
 from foosim.world.scene import Quaternion, Vector, multiply
 
 CONTACTS_MAX: Final = 6
-"""Contacts with the scenery that are put right in one substep: a corner has three, and once more."""
+"""Contacts with the scenery that are resolved in one substep: a corner has three, and once more."""
 DEPTH_MIN: Final = 1e-12
 """Overlaps below this (m) are rounding."""
 
@@ -78,7 +78,7 @@ class PureEngine:
                 self._quaternions[name] = (state[at], state[at + 1], state[at + 2], state[at + 3])
 
     def command(self, entities: Sequence[Entity], commands: Sequence[Sequence[tuple[float, ...]]]) -> None:
-        """Set the motors of these robots: for each joint what a `drives.Motor` has."""
+        """Set the motors of these robots: for each joint the numbers of a `drives.Motor`."""
         for entity, (slide, spin) in zip(entities, commands, strict=True):
             shaft = self._shafts.get(entity.name)
             if shaft is not None:
@@ -116,7 +116,7 @@ class PureEngine:
     def _strike(
         self, sphere: FreeSphere, shaft: Shaft, shapes: ShaftShapes, pushes: list[Vector], substep: int
     ) -> None:
-        """Let a sphere and a shaft part if they overlap; add the normal to `pushes`."""
+        """Separate a sphere and a shaft if they overlap; add the normal to `pushes`."""
         contact = shapes.contact(sphere, shaft)
         if contact is None:
             return
@@ -144,9 +144,9 @@ class PureEngine:
             other.log.add(impulse, substep)
 
     def _land(self, sphere: FreeSphere, pushes: Sequence[Vector], substep: int) -> None:
-        """Put a sphere out of the scenery, the deepest contact first: the next is found from where that left it.
+        """Move a sphere out of the scenery, the deepest contact first: the next is found after that.
 
-        What a shaft pushes against the scenery does not bounce off it, else a pinned sphere would hammer on both.
+        A sphere that a shaft pushes against the scenery does not bounce, else a pinned sphere would hammer on both.
         """
         things = self._scenery[sphere.radius].near(sphere.x, sphere.y)
         rounds = 1 if len(things) == 1 else CONTACTS_MAX
@@ -203,4 +203,4 @@ class PureEngine:
         return x / size, y / size, z / size, w / size
 
     def close(self) -> None:
-        """Free what the engine holds: nothing outside of Python."""
+        """Free the engine: it holds nothing outside of Python."""

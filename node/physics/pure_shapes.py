@@ -1,4 +1,4 @@
-"""What touches a sphere in the pure engine: the scenery's boxes and cylinders, a shaft's cylinder and its boxes.
+"""Shapes that touch a sphere in the pure engine: the scenery's boxes and cylinders, a shaft's cylinder and boxes.
 
 Distances are from the sphere's centre to the nearest point of a box (Ericson, "Real-Time Collision Detection", section
 5.1.3) or cylinder; inside of one, to the nearest face.
@@ -15,7 +15,7 @@ from foosim.world.matter.physics import Contact
 from foosim.world.scene import UPRIGHT, Body, Box, Cylinder, Shape, Vector, rotate, shape_box
 
 CELL_M: Final = 0.05
-"""Side of the cells, in plan, for which the scenery near a sphere is remembered."""
+"""Side of the cells, in plan, for which the scenery near a sphere is kept."""
 Touch = tuple[float, Vector, Contact]
 """Depth (m, positive where they overlap), normal towards the sphere (unit, world frame), pair."""
 
@@ -97,7 +97,7 @@ class Still:
 
 
 class Scenery:
-    """All boxes and cylinders of the scenery, found by where a sphere of some radius is."""
+    """All boxes and cylinders of the scenery, found by the place of a sphere of some radius."""
 
     def __init__(self, things: Sequence[Still], radius: float) -> None:
         self._things = tuple(things)

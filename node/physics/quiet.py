@@ -1,4 +1,4 @@
-"""Keeps one known line of a compiled library off the terminal, and nothing else.
+"""Keeps one known line of a compiled library off the terminal.
 
 Such a library writes to the file descriptors themselves, past `sys.stderr`.
 """
@@ -16,9 +16,9 @@ STANDARD_STREAMS: Final = (1, 2)
 
 @contextmanager
 def without_lines(start: bytes) -> Iterator[None]:
-    """Leave out what is written meanwhile in lines that begin so; all other lines come out at the end.
+    """Drop lines with this beginning that are written meanwhile; all other lines come out at the end.
 
-    Other threads may write meanwhile, and errors are never to be lost, so what is not known passes.
+    Other threads may write meanwhile, and no error may be lost, so unknown lines pass.
     """
     kept = {stream: os.dup(stream) for stream in STANDARD_STREAMS if _is_open(stream)}
     with ExitStack() as stack:

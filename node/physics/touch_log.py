@@ -1,4 +1,4 @@
-"""With whom the links of a body were in contact in a tick: its fields `touches` and what belongs to these."""
+"""The contacts of a body's links in a tick: its field `touches` and the fields beside it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class _Met:
 class TouchLog:
     """The contacts of one body in one tick.
 
-    In whichever order they are added they give the same bits.
+    Any order of adding gives the same bits.
     """
 
     __slots__ = ("_met",)
@@ -49,8 +49,7 @@ class TouchLog:
     def write(self, entity: Entity, numbers: list[float], substeps: int) -> None:
         """Write the fields of the body, which have those of the tick before.
 
-        Of more contacts than there is room for those with the greatest impulses are kept, in the order in which they
-        began.
+        Of too many contacts those with the greatest impulses are kept, in the order in which they began.
         """
         if not self._met and numbers[entity.offsets["touch_partners"]] == NO_ENTITY:
             return  # as it is there
@@ -86,7 +85,7 @@ def _by_time(row: _Row) -> tuple[int, int, int]:
 
 
 def _lasting(entity: Entity, numbers: Sequence[float], substeps: int) -> list[tuple[float, float]]:
-    """Return partner and link of the contacts that there were in the last substep of the tick before."""
+    """Return partner and link of the contacts in the last substep of the tick before."""
     partners, links, ends = (entity.offsets[name] for name in ("touch_partners", "touch_links", "touch_ends"))
     return [
         (numbers[partners + row], numbers[links + row])
@@ -96,7 +95,7 @@ def _lasting(entity: Entity, numbers: Sequence[float], substeps: int) -> list[tu
 
 
 def clear_touches(entity: Entity, numbers: list[float]) -> None:
-    """Write that a body that logs its touches has none."""
+    """Clear the log of a body with `touches`."""
     at = entity.offsets
     numbers[at["touches"]] = 0.0
     start = at["touch_partners"]

@@ -23,7 +23,7 @@ from foosim.simulation.check.changes import changed, with_comings
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings, System
 from foosim.world.assembly.used_forms import forms_of
-from foosim.world.assembly.world import World, asked_together
+from foosim.world.assembly.world import World, commands_together
 from foosim.world.components.fitted import BoundActuator, BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, View, called, has_together, some_together
@@ -104,7 +104,7 @@ class ComponentCheck:
     def broken(self) -> Iterator[str]:
         """Yield which laws the deployment's components break, in words, as each is found."""
         self.begin("on one node")
-        self.first, alone = self._rehearsed(self.text, 1, is_watched=True)
+        self.first, alone = self._rehearsed(self.text, 1, is_guarded=True)
         self.has_failed = self.first["failed"]
         if self.has_failed:
             yield str(self.first["reason"])
@@ -149,10 +149,10 @@ class ComponentCheck:
             yield f"{what} the world is another one: {where or result['reason']}"
 
     def _rehearsed(
-        self, text: str, nodes: int, prepare: Callable[[System], None] | None = None, *, is_watched: bool = False
+        self, text: str, nodes: int, prepare: Callable[[System], None] | None = None, *, is_guarded: bool = False
     ) -> tuple[dict[str, Any], list[Frame]]:
         frames: list[Frame] = []
-        settings = Settings(on_commit=frames.append, is_watched=is_watched)
+        settings = Settings(on_commit=frames.append, is_guarded=is_guarded)
         return self.run(text, self.name, self.ticks, nodes, settings=settings, prepare=prepare).json, frames
 
 
@@ -278,7 +278,7 @@ class _Compared:
         what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in actuators[:NAMED_MAX])}"
         made = called(what, "", frame.tick, type(members[0]).together, members)
         together = some_together(what, frame.tick, made, members, np.arange(len(members))[::-1])
-        asked = asked_together(what, together, len(actuators), view)[::-1]
+        asked = commands_together(what, together, len(actuators), view)[::-1]
         for one, its in zip(actuators, asked.tolist(), strict=True):
             label = f"actuator {one.channel} of {one.robot}"
             alone = called(f"actuator {one.channel}", one.robot, frame.tick, one.actuator.command, view)

@@ -96,6 +96,6 @@ class Silent(Exception):
 
 
 def test_whatever_an_error_says_it_is_one_line() -> None:
-    assert failure_of(Silent(), "own") == "Silent: its text cannot be made"
+    assert failure_of(Silent(), "own") == "Silent: its text cannot be read"
     assert failure_of(ValueError("a\n b" * 1000), "own").endswith("...")
     assert failure_of(KeyboardInterrupt(), "own") == "KeyboardInterrupt"

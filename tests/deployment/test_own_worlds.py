@@ -420,7 +420,7 @@ def test_modifiers_of_a_sensor_that_speaks_have_room_for_a_value_at_each_tick(si
         ("floor", ""),
         ("", ""),
         ("flor", "scene own_form:shapes has an unknown surface (there are: figures, floor, goal, ramps, "
-         "rods, walls; and '' of what no rigid body feels), 'flor', nearest is 'floor'"),
+         "rods, walls; and '' without contacts), 'flor', nearest is 'floor'"),
     ],
 )  # fmt: skip
 def test_surfaces_of_a_scene_are_those_that_rigid_bodies_feel(site: Path, surface: str, told: str) -> None:

@@ -43,7 +43,7 @@ def _any_digest(planting: Planting) -> None:
 
 @register("node does not ask again", "who has had no progress asks again (node)", 2)
 def _patient_node(planting: Planting) -> None:
-    planting.swap(NodeCore, "_ask_again", lambda self, now_ns: self._retry.requested(now_ns))
+    planting.swap(NodeCore, "_request_missing", lambda self, now_ns: self._retry.requested(now_ns))
 
 
 @register("node does not answer who asks", "senders keep what is not yet committed (node)", 2)

@@ -156,8 +156,8 @@ class World:
         self.layout = build_layout(self.deployment)
         self.engine = make_engine(self.deployment, self.layout)
 
-    def tick(self, tick: int = TICK, *, is_watched: bool = False) -> Stepper:
-        stepper = Stepper(self.deployment, self.layout, is_watched=is_watched)
+    def tick(self, tick: int = TICK, *, is_guarded: bool = False) -> Stepper:
+        stepper = Stepper(self.deployment, self.layout, is_guarded=is_guarded)
         frame = Frame(tick, self.layout, np.array(initial_numbers(self.deployment, self.layout)))
         stepper.sense(frame, self.layout.robots)
         layout = self.layout
@@ -331,12 +331,12 @@ DIRECT: Final = {
 def test_a_direct_write_to_the_frame_is_found_where_forms_are_watched(world: World, name: str) -> None:
     world.module.acts[name] = overwrites(world.layout["blue.attack"].offsets["joint_positions"])
     with pytest.raises(ComponentError) as error:
-        world.tick(is_watched=True)
+        world.tick(is_guarded=True)
     assert DIRECT[name] in str(error.value)
 
 
 def test_forms_that_are_watched_may_write_what_is_theirs(world: World) -> None:
-    world.tick(is_watched=True)
+    world.tick(is_guarded=True)
 
 
 @pytest.mark.parametrize("name", ["sensor", "rule"])

@@ -16,7 +16,7 @@ from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, table_reach_of
-from foosim.world.assembly.standing import Standing
+from foosim.world.assembly.standing import UnmovedBodies
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
 from foosim.world.robot_packets import Delivered
@@ -33,7 +33,7 @@ DRIVES: Final = {
 }
 
 
-class Awake(Standing):
+class Awake(UnmovedBodies):
     """Lets everything be solved, always."""
 
     def awake(self, bodies: Sequence[Entity], *_: object) -> list[Entity]:
@@ -51,7 +51,7 @@ class Node:
         self.stepper = Stepper(self.deployment, self.layout)
         if not rests:
             world = self.stepper.world
-            self.stepper._standing = Awake(self.layout, world.actuators, world.ruled)
+            self.stepper._unmoved = Awake(self.layout, world.actuators, world.ruled)
         self.engine = make_engine(self.deployment, self.layout)
         owners = {robot.name: "n" for robot in self.layout.robots}
         self.assignment = Assignment(self.layout, table_reach_of(self.deployment, self.layout), ["n"], owners)
@@ -106,6 +106,6 @@ def test_an_edit_wakes_it() -> None:
     assert one.frame.at("red.goal", "unmoved") == 1.0
     numbers = list(one.frame.numbers)
     numbers[one.layout["red.goal"].offsets["joint_velocities"]] = 0.1
-    one.stepper._standing.wake_edited(one.frame, numbers)
+    one.stepper._unmoved.wake_edited(one.frame, numbers)
     assert numbers[one.layout["red.goal"].offsets["unmoved"]] == 0.0
     assert numbers[one.layout["blue.goal"].offsets["unmoved"]] == 1.0

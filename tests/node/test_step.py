@@ -172,11 +172,11 @@ def test_an_edit_that_does_not_fit_changes_nothing(edit: Edit) -> None:
 
 
 @pytest.mark.parametrize("bad", [nan, inf, -inf])
-def test_edits_with_numbers_that_are_not_finite_are_malformed(bad: float) -> None:
+def test_edits_with_non_finite_numbers_are_malformed(bad: float) -> None:
     check_edits([Add("a2", [*HERE]), Push("ball", HERE), Remove("a2")])
     wrong: list[Edit] = [Add("a2", [0.0, bad]), Push("ball", (bad, 0.0, 0.0)), Set("ball", "position", [bad])]
     for edit in wrong:
-        with pytest.raises(Malformed, match="not finite"):
+        with pytest.raises(Malformed, match="non-finite"):
             check_edits([Remove("a2"), edit])
 
 

@@ -166,7 +166,7 @@ def test_a_sensor_that_counts_its_like_is_found_beside_a_second_one(planted: Pat
 
 def test_a_write_to_anothers_slot_ends_the_run_with_both_names(planted: Path) -> None:
     (line,) = broken(planted, RULE.replace("APPLY", "view.write(self.ball, 0.0, 0.0, 1.0)"), OF_WORLD)
-    assert "rule own of the world failed" in line and "ball position, which is not its own" in line
+    assert "rule own of the world failed" in line and "ball position, neither its own slot nor" in line
 
 
 def test_a_reading_that_is_another_beside_its_like_is_found(planted: Path) -> None:

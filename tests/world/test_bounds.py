@@ -30,6 +30,9 @@ class Limited(Actuator):
     def limits(self) -> dict[str, tuple[float, float]]:
         return self._limits
 
+    def names(self) -> tuple[str, ...]:
+        return ()
+
 
 @pytest.mark.parametrize("number", [nan, inf, -inf])
 def test_what_a_modifier_makes_infinite_is_refused(number: float) -> None:

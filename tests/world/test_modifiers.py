@@ -222,7 +222,7 @@ class Failing(Sensor):
     ("how", "tick", "reason"),
     [
         ("raises", 50, "sensor own of red.goal failed at tick 50: ValueError: no more"),
-        ("writes", 50, "failed at tick 50: AssertionError: it writes red.goal joint_positions, which is not its own"),
+        ("writes", 50, "failed at tick 50: AssertionError: it writes red.goal joint_positions, neither its own slot"),
     ],
 )
 @pytest.mark.parametrize("nodes", [1, 2])

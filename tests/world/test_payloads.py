@@ -248,8 +248,8 @@ def test_one_ray_and_128_are_rays() -> None:
     [
         (b"", "0 bytes, encoder has 16"),
         (bytes(24), "24 bytes, encoder has 16"),
-        (np.array([0.0, nan]).tobytes(), "encoder with numbers that are not finite"),
-        (np.array([inf, -inf]).tobytes(), "encoder with numbers that are not finite"),
+        (np.array([0.0, nan]).tobytes(), "encoder with non-finite numbers"),
+        (np.array([inf, -inf]).tobytes(), "encoder with non-finite numbers"),
     ],
 )
 def test_what_does_not_fit_says_why(payload: bytes, text: str) -> None:
@@ -445,7 +445,7 @@ def test_positions_at_times_come_back_however_they_are_written(
         ({"times": [1.0], "positions": [0.0]}, "Expected `array`, got `float` - at `$.positions[0]`"),
         ({"times": [1.0], "positions": [[]]}, "Expected `array` of length >= 1 - at `$.positions[0]`"),
         ({"times": [1.0], "positions": [["up"]]}, "Expected `float`, got `str` - at `$.positions[0][0]`"),
-        ({"times": [1.0], "positions": [[nan]]}, "joint_trajectory with numbers that are not finite"),
+        ({"times": [1.0], "positions": [[nan]]}, "joint_trajectory with non-finite numbers"),
         ({"times": 1.0, "positions": [[0.0]]}, "Expected `array`, got `float` - at `$.times`"),
         (([1.0],), "1 number given"),
     ],

@@ -94,9 +94,9 @@ SLOTS: Final = {
     "lambda settings, on: {'kept': 100_000}": "its slots are wrong: kept has 1 to 65536 numbers, or ENTITY, not "
     "100000, 'own'",
     "lambda settings, on: {'samples': 1}": "its slots are wrong: each sensor has a slot samples already, 'own'",
-    "lambda settings, on: 1 // 0": "its slots are not known: ZeroDivisionError: integer division or modulo by zero "
+    "lambda settings, on: 1 // 0": "its slots failed: ZeroDivisionError: integer division or modulo by zero "
     "(own_form.py:LINE), 'own'",
-    "lambda settings: {}": "its slots are not known: TypeError: <lambda>() takes 1 positional argument but 2 were "
+    "lambda settings: {}": "its slots failed: TypeError: <lambda>() takes 1 positional argument but 2 were "
     "given, 'own'",
     "refuse": "more than can be kept, '3 s'",
 }

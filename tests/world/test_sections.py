@@ -1,4 +1,4 @@
-"""One kit of a world says what rigid bodies feel; who has it otherwise is refused with its place."""
+"""One kit of a world defines the physics of rigid bodies; a second definition is refused with its place."""
 
 from __future__ import annotations
 
@@ -31,6 +31,6 @@ def test_two_that_say_it_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[tuple[str, Any]] = [("table", kit), ("zoo", kit)]
     monkeypatch.setattr(sections, "kits_of", lambda spec: given)
     (twice,) = findings_of(DEPLOYMENT)
-    assert (twice.location, twice.what) == (("zoo",), "says what rigid bodies feel, which table says already")
+    assert (twice.location, twice.what) == (("zoo",), "defines the physics of rigid bodies, as table does already")
     given.clear()
     assert list(findings_of(DEPLOYMENT)) == [], "without a kit that says it, the deployment's physics are felt"

@@ -60,8 +60,8 @@ def test_contacts_are_those_of_the_last_tick() -> None:
 def referring() -> Layout:
     """The table, with two slots on each ball: a reference to an entity, and a plain number."""
     declared = LAYOUT.declared
-    memory = {**declared.memory, "ball": {**declared.memory["ball"], "own.target": ENTITY, "own.index": 1}}
-    return Layout(LAYOUT.models, replace(declared, memory=memory))
+    rule_slots = {**declared.rule_slots, "ball": {**declared.rule_slots["ball"], "own.target": ENTITY, "own.index": 1}}
+    return Layout(LAYOUT.models, replace(declared, rule_slots=rule_slots))
 
 
 def test_a_reference_is_none_when_its_entity_leaves_and_stays_so() -> None:

@@ -156,11 +156,11 @@ def test_an_inertia_is_that_of_its_file_in_the_links_frame() -> None:
 
 def test_what_is_passed_over_is_noted_with_its_lines() -> None:
     (note,) = askew().notes
-    assert note.startswith("visual (line 11): what is seen of a robot are its collision shapes")
+    assert note.startswith("visual (line 11): a robot is drawn by its collision shapes")
     text = robot_text(more='<transmission name="t"/><gazebo><mu1>1</mu1></gazebo><gazebo/><dance/>')
     notes = read_urdf("a.urdf", {"a.urdf": text}).notes
     assert [note.partition(" (")[0] for note in notes] == ["dance", "gazebo", "transmission"]
-    assert "gazebo (lines 2, 2): what it says is for another simulator" in notes
+    assert "gazebo (lines 2, 2): it is for another simulator" in notes
 
 
 def test_meshes_are_named_by_paths_inside_the_asset_folder() -> None:
@@ -376,15 +376,15 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "empty": (b"", "1: an empty file"),
     "blank": (b" \n\n", "1: an empty file"),
     "text": (b"hello", "1: no XML, syntax error"),
-    "cut": (robot_text()[:60], "2: the file ends here, in the inertial of line 2, which is not closed"),
-    "cut in a tag": (robot_text()[:40], "2: the file ends here, in the link of line 2, which is not closed"),
+    "cut": (robot_text()[:60], "2: the file ends here, in the unclosed inertial of line 2"),
+    "cut in a tag": (robot_text()[:40], "2: the file ends here, in the unclosed link of line 2"),
     "only a head": (b"<?xml version='1.0'?>\n<!-- -->\n", "3: the file ends here, without an element"),
     "zero byte": (b"<robot>\0</robot>", "1: no XML, not well-formed"),
     "not UTF-8": (b'<robot name="\xff"/>', "1: no XML, not well-formed"),
-    "no encoding": (b'<?xml version="1.0" encoding="utf-99"?><robot/>', "1: no XML, (unknown encoding|an encoding)"),
-    "wide encoding": (b'<?xml version="1.0" encoding="gbk"?><robot/>', "1: no XML, an encoding that is not read"),
+    "no encoding": (b'<?xml version="1.0" encoding="utf-99"?><robot/>', "1: no XML, (unknown|an unsupported) encoding"),
+    "wide encoding": (b'<?xml version="1.0" encoding="gbk"?><robot/>', "1: no XML, an unsupported encoding"),
     "two robots": (b"<robot/>\n<robot/>", "2: no XML, junk after document element"),
-    "bomb": (BOMB, "2: a document type, which a robot has none of"),
+    "bomb": (BOMB, "2: a document type: it may define entities"),
     "external entity": (OUTSIDE, "1: a document type"),
     "unknown entity": (b"<robot>\n&lol;</robot>", "2: no XML, undefined entity"),
     "deep": (b"<robot>" + b"<link>" * 99 + b"</link>" * 99 + b"</robot>", f"1: elements more than {DEPTH_MAX} deep"),
@@ -395,7 +395,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "sdf": (b"<sdf version='1.7'/>", "1: no URDF: the outermost element is robot, 'sdf'"),
     "xacro": (
         b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">\n<xacro:include filename="a"/></robot>',
-        "2: a file of xacro, which is not expanded",
+        "2: an unexpanded file of xacro",
     ),
     "no links": (b"<robot/>", "1: a robot without links"),
     "no shapes": (b'<robot><link name="a"/></robot>', "1: a robot without a collision shape"),
@@ -420,12 +420,12 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "no child": (robot_text().replace(b'<child link="b"/>', b""), "3: a joint without child, 'j'"),
     "floating": (
         robot_text(kind="floating"),
-        "3: a joint that is not there, valid are fixed, .*a free joint is the base's alone.*'floating'",
+        "3: an unknown type of joint, valid are fixed, .*a free joint is the base's alone.*'floating'",
     ),
     "planar": (robot_text(kind="planar"), "3: .*two prismatic joints and a revolute one do the same, 'planar'"),
     "kind": (
         robot_text(kind="hinge"),
-        "3: a joint that is not there, valid are fixed, revolute, continuous, prismatic, 'hinge'",
+        "3: an unknown type of joint, valid are fixed, revolute, continuous, prismatic, 'hinge'",
     ),
     "mimic": (robot_text(joint=LIMIT + '\n<mimic joint="k"/>'), "4: a mimic joint: .*'j'"),
     "zero axis": (robot_text(joint=LIMIT + '\n<axis xyz="0 0 0"/>'), "4: an axis without a direction, '0 0 0'"),
@@ -469,7 +469,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "damping": (robot_text(joint=LIMIT + '<dynamics damping="-1"/>'), "3: damping of dynamics is not within 0"),
     "moves nothing": (
         robot_text().replace(MASS.encode(), b"", 2),
-        "2: the joint j moves nothing: b, with what is fixed to it",
+        "2: the joint j moves nothing: b, with all that is fixed to it",
     ),
     "no mass": (inertial(**UNIT).replace(b'\n<mass value="1"/>', b""), "2: an inertial without mass, 'c'"),
     "negative mass": (inertial("-1", **UNIT), "3: a mass of -1 kg, valid are 1e-06 to"),
@@ -484,7 +484,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "no shape": (collision(""), r"4: a geometry with 0 shapes: it has one|3: a geometry with 0"),
     "cone": (
         collision('<cone radius="1"/>'),
-        "4: no shape that is known, there are box, sphere, cylinder, capsule, mesh, 'cone'",
+        "4: an unknown shape, there are box, sphere, cylinder, capsule, mesh, 'cone'",
     ),
     "flat box": (collision('<box size="1 1 0"/>'), "4: size of box is not within 0.0001 to 1000, '1 1 0'"),
     "negative radius": (collision('<sphere radius="-1"/>'), "4: radius of sphere is not within"),
@@ -503,7 +503,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
         collision('<mesh filename="flat.obj"/>'),
         "4: a mesh without a convex hull: 3 different corners.*'flat.obj'",
     ),
-    "bad mesh": (collision('<mesh filename="bad.obj"/>'), "4: a mesh that is not acceptable: bad.obj:1: "),
+    "bad mesh": (collision('<mesh filename="bad.obj"/>'), "4: an invalid mesh: bad.obj:1: "),
     "colour": (robot_text(more='\n<material name="m"><color rgba="1 0"/></material>'), "3: a colour has 4 numbers"),
     "bright": (
         robot_text(more='\n<material name="m"><color rgba="2 0 0 1"/></material>'),
@@ -511,7 +511,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     ),
     "plugin": (
         robot_text(more='<gazebo>\n<plugin name="p" filename="libcontrol.so"/></gazebo>'),
-        "3: a plugin, which is not loaded: .*'libcontrol.so'",
+        "3: an unsupported plugin: .*'libcontrol.so'",
     ),
     "loop joint": (
         robot_text(more='\n<loop_joint name="l"/>'),

@@ -73,7 +73,7 @@ class HubState:
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
         self._transit = InFlightLimit(len(self._endpoints))
-        self._here = Here(deployment, self.sampling.speaking)
+        self._here = Here(deployment, self.sampling.triggered)
         self.existence = Existence(deployment)
 
     # --- joining -----------------------------------------------------------------------------------------------------

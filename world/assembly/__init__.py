@@ -1,1 +1,1 @@
-"""A world put together from its forms: what computes it, what it begins with, how its ticks are divided."""
+"""A world built from its forms: its engine-independent computation, its start, the division of its ticks."""

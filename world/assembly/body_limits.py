@@ -1,7 +1,7 @@
-"""What the state of a rigid body of any kind can be after a tick: what cannot be is a failure of its engine.
+"""Limits of the state of a rigid body of any kind after a tick: a state beyond them is a failure of its engine.
 
-Speed alone is none, below `SPEED_MAX_M_S`: what falls from high, or is hit, is faster than its model promises. Its
-volume grows with its speed, so it meets nobody within a tick who is not in its island.
+Speed alone is no failure below `SPEED_MAX_M_S`: a body that falls from high, or is hit, is faster than its model
+promises. Its volume grows with its speed, so within a tick it meets only bodies of its island.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from foosim.world.spec import WorldSpec
 
 SPEED_MAX_M_S: Final = 1000.0
 WORLD_MAX_M: Final = 100e3
-"""No coordinate of a free body is farther out, as none of a place in a deployment is."""
+"""The greatest coordinate of a free body, as of a place in a deployment (m)."""
 STOP_DEPTH_M: Final = 0.02
 STOP_DEPTH_RAD: Final = 0.1
-"""How far a joint may be beyond its limits: its stops give way a little."""
+"""The tolerance of a joint beyond its limits: its stops give way a little."""
 ROUNDING: Final = 1.000001
 
 
@@ -50,7 +50,7 @@ class BodyLimits:
         return index in self._limits
 
     def problem(self, entity: Entity, numbers: Sequence[float], before: Sequence[float]) -> str:
-        """Return in words why an entity's new, finite state cannot be; empty where it can."""
+        """Return in words why an entity's new, finite state is invalid; empty for a valid one."""
         its = self._limits.get(entity.index)
         if its is None:
             return ""
@@ -78,7 +78,7 @@ class BodyLimits:
 
 
 def speed_of(entity: Entity, radius: float, numbers: Sequence[float]) -> float:
-    """Return a bound of how fast any part of a free body moves (m/s): |v| + |w| x radius."""
+    """Return a bound of the speed of any part of a free body (m/s): |v| + |w| x radius."""
     at, spin = entity.offsets["linear_velocity"], entity.offsets["angular_velocity"]
     x, y, z = numbers[at : at + 3]
     a, b, c = numbers[spin : spin + 3]

@@ -1,4 +1,4 @@
-"""When the events of a world do what: a function of the deployment, so that it is the same for all who compute it."""
+"""The schedule of a world's events: a function of the deployment, so that all nodes compute the same."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from foosim.world.spec import WorldSpec
 
 
 class Scheduled(NamedTuple):
-    """What an event does to an entity: it sets a field, or where there is none adds or removes it."""
+    """The effect of an event on an entity: it sets a field, or without a field adds or removes the entity."""
 
     name: str
     verb: Literal["set", "add", "remove"]
@@ -22,7 +22,7 @@ class Scheduled(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What happens, in words."""
+        """The effect in words."""
         if self.verb != "set":
             return f"{self.name} is {'added' if self.verb == 'add' else 'removed'}"
         value = str(self.value).lower() if isinstance(self.value, bool) else self.value
@@ -30,7 +30,7 @@ class Scheduled(NamedTuple):
 
 
 def events_by_tick(spec: WorldSpec) -> dict[int, list[Scheduled]]:
-    """Return what the events of a world do, by the tick at whose start they do, in the order of their list."""
+    """Return the effects of a world's events, by the tick at whose start they happen, in the order of their list."""
     found: dict[int, list[Scheduled]] = {}
     for number, event in enumerate(spec.events):
         for name, tick in _drawn(spec, number, event):
@@ -39,7 +39,7 @@ def events_by_tick(spec: WorldSpec) -> dict[int, list[Scheduled]]:
 
 
 def done_to(name: str, event: WorldEvent) -> list[Scheduled]:
-    """Return what an event does to an entity, in the order of its fields."""
+    """Return the effects of an event on an entity, in the order of its fields."""
     if event.add is not None:
         return [Scheduled(name, "add", "", event.add)]
     if event.fields is None:
@@ -48,7 +48,7 @@ def done_to(name: str, event: WorldEvent) -> list[Scheduled]:
 
 
 def matched(spec: WorldSpec, selector: str) -> list[str]:
-    """Return the robots, objects and what kits bring that a selector matches, in name order; `world` is the world."""
+    """Return the robots, objects and entities of kits that a selector matches, in name order; `world` is the world."""
     brought = [name for kit in spec.kit_types.values() for name in (*kit.entities, *spares_of(spec, kit))]
     if selector == WORLD and any(one.component_type.settable for one in spec.world_rules.values()):
         return [WORLD]

@@ -1,6 +1,6 @@
-"""The grippers of a layout: which link holds, how far it reaches, and where the frame has what it holds.
+"""The grippers of a layout: the link that holds, its reach, and the place of the held entity in the frame.
 
-What is held is solved with its holder, and let go where one of them is put elsewhere or comes into quarantine.
+A held entity is solved with its holder, and released where one of them is put elsewhere or comes into quarantine.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ UNSEEN = (0.0, 0.0, 0.0, 0.0)
 
 class Gripper(NamedTuple):
     """The index of a robot, that of the link which holds, the grip in the frame of the link (m), its reach (m); and the
-    places of the reference to what is held, and of the first of the seven numbers of the grasp."""
+    places of the reference to the held entity, and of the first of the seven numbers of the grasp."""
 
     robot: int
     link: int
@@ -51,7 +51,7 @@ def _grippers_of(spec: WorldSpec, layout: Layout) -> Iterator[Gripper]:
 
 
 def reaching(body: Body, grippers: Iterable[Gripper]) -> Body:
-    """Return a body with a ball around each of its grips, as far as that reaches: for its volume."""
+    """Return a body with a ball around each of its grips, of the grip's reach: for its volume."""
     links = list(body.links)
     for one in grippers:
         ball = Shape(Sphere(one.reach_m), "", UNSEEN, one.grip)
@@ -60,7 +60,7 @@ def reaching(body: Body, grippers: Iterable[Gripper]) -> Body:
 
 
 def release(grippers: Iterable[Gripper], numbers: list[float], entity: Entity) -> list[int]:
-    """Let go what an entity holds, and the entity where it is held; return the indices of what was let go."""
+    """Release the entity that an entity holds, and the entity where it is held; return the released indices."""
     found = []
     for one in grippers:
         held = int(numbers[one.held])

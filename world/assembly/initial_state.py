@@ -1,4 +1,4 @@
-"""What a run begins with: the world at tick 0, or a frame of another run.
+"""The start of a run: the world at tick 0, or a frame of another run.
 
 Tick 0 is a pure function of the deployment. A run that begins with a frame of another one keeps that
 frame's tick and the chain up to it, so that equal inputs give equal digests.

@@ -26,7 +26,7 @@ from foosim.world.spec import WorldSpec
 
 @dataclass(frozen=True)
 class Share:
-    """What one node computes in a tick: its islands and, ascending, every entity index in its part.
+    """The work of one node in a tick: its islands and, ascending, every entity index in its part.
 
     `movers` are those in the way of each island; empty where nothing has any.
     """
@@ -44,7 +44,7 @@ def reach_of(spec: WorldSpec, layout: Layout) -> Reach | Volumes:
 
 
 def table_reach_of(spec: WorldSpec, layout: Layout) -> Reach:
-    """Return the bounding volumes of rods and balls, and who moves alone."""
+    """Return the bounding volumes of rods and balls, and the entities that move alone."""
     alone = tuple(
         Island((entity.index,), entity.name if entity.is_robot else "")
         for entity in layout.entities
@@ -58,7 +58,7 @@ def table_reach_of(spec: WorldSpec, layout: Layout) -> Reach:
 Near = tuple[int, int, str]
 """Of one ball: the range of rods (in order of x) that it could touch within the tick, and the nearest one's name."""
 Touching = tuple[tuple[Near, ...], tuple[tuple[int, int], ...]]
-"""What islands follow from: `Near` of every ball, and the pairs of balls that could touch each other."""
+"""The base of islands: `Near` of every ball, and the pairs of balls that could touch each other."""
 
 
 def touching_of(numbers: Sequence[float], reach: Reach) -> Touching:
@@ -126,8 +126,8 @@ class Assignment:
         self.layout = layout
         self.presence = Presence(layout)
         self.reach = reach
-        """Of those who are present."""
-        self._everybody = reach
+        """The volumes of present entities."""
+        self._all_reach = reach
         self._absent: frozenset[int] = frozenset()
         self.roster = tuple(roster)
         self.owners = dict(owners)
@@ -145,7 +145,7 @@ class Assignment:
         array, where there is one."""
         absent = self.presence.absent(numbers if values is None else values)
         if absent is not self._absent:
-            self._absent, self.reach = absent, self._everybody.without(absent)
+            self._absent, self.reach = absent, self._all_reach.without(absent)
             self._shares, self._divided = {}, ([], {})
         if isinstance(self.reach, Volumes):
             islands = self.reach.islands(numbers)
@@ -193,6 +193,6 @@ class Assignment:
         }
 
     def _add_unsolved(self, solved: dict[str, list[int]]) -> None:
-        """Add who stays as it is, or is absent: its owner copies it, the first node what has none."""
+        """Add unsolved and absent entities: each is copied by its owner, by the first node without one."""
         for index in sorted({*self._unsolved, *self._absent}):
             solved[self.owners.get(self.layout.entities[index].name, self.roster[0])].append(index)

@@ -1,4 +1,4 @@
-"""Who is absent in the frames of a layout."""
+"""The absent entities in the frames of a layout."""
 
 from __future__ import annotations
 
@@ -28,8 +28,7 @@ class Presence:
         self._absent: frozenset[int] = frozenset()
 
     def absent(self, numbers: Sequence[float] | NDArray[np.float64]) -> frozenset[int]:
-        """Return the indices of those who are absent in a frame of these numbers; an array takes a fraction of the
-        time."""
+        """Return the indices of absent entities in a frame of these numbers; an array takes a fraction of the time."""
         flags = numbers[self._in_array].tobytes() if isinstance(numbers, np.ndarray) else self._flags_of(numbers)
         if flags != self._flags:
             self._flags = flags

@@ -22,16 +22,16 @@ from foosim.world.spec import WorldSpec
 
 STILL_M: Final = 50e-6
 STILL_RAD: Final = 50e-6
-"""What stays within these of a pose is still. In the time of rest a box creeps by 22 um down a slope of 15 degrees; a
-ball on one of 0.05 degrees rolls by 760 um, a pole that is 2 mrad past its balance turns by 3 mrad."""
+"""A body that stays within these of a pose is still. In the time of rest a box creeps by 22 um down a slope of 15
+degrees; a ball on one of 0.05 degrees rolls by 760 um, a pole that is 2 mrad past its balance turns by 3 mrad."""
 MAY_CHANGE: Final = frozenset((STILL_TICKS, STILL_POSE, "refused", "clamped"))
 """Fields of a body at rest that may change."""
 REST_NS: Final = 500_000_000
-"""How long all bodies of an island are still before they are at rest."""
+"""The time for which all bodies of an island are still before they are at rest."""
 
 
 class Rest:
-    """Which bodies of a layout are at rest."""
+    """The bodies at rest of a layout."""
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self.ticks = -(-REST_NS // spec.tick_ns)
@@ -49,25 +49,25 @@ class Rest:
         return not movers or not any(moves(mover, start) for mover in movers)
 
     def wake(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
-        """Begin to count anew: what one of them holds, or is held by, is another."""
+        """Begin to count anew for bodies with a new grasp."""
         for entity in bodies:
             at = self._slots.get(entity.index)
             if at is not None:
                 numbers[at] = 0.0
 
     def keep(self, bodies: Sequence[Entity], numbers: list[float]) -> None:
-        """Leave bodies at rest as they are; what they touch they have touched before."""
+        """Keep bodies at rest as they are, without new contacts."""
         for entity in bodies:
             at = entity.offsets["contacts"]
             numbers[at : at + 2] = 0.0, 0.0
 
     def count(self, bodies: Sequence[Entity], drives: Sequence[Drives], numbers: list[float]) -> None:
-        """Count the ticks for which bodies are still after a tick, and stop those that come to rest with it."""
-        for entity, asked in zip(bodies, drives, strict=True):
+        """Count the ticks for which bodies are still after a tick, and stop bodies that come to rest with it."""
+        for entity, commands in zip(bodies, drives, strict=True):
             at = self._slots.get(entity.index)
             if at is None:
                 continue
-            if asked.is_moving or not is_still(entity, numbers):
+            if commands.is_moving or not is_still(entity, numbers):
                 numbers[at] = 0.0
                 kept = entity.offsets[STILL_POSE]
                 numbers[kept : kept + entity.counts[STILL_POSE]] = _pose(entity, numbers)
@@ -78,8 +78,8 @@ class Rest:
 
 
 def wake_edited(before: Frame, numbers: list[float], edits: Sequence[Edit]) -> None:
-    """Begin to count anew for each body that an order or a rule of the world has changed; for all where an order puts
-    something elsewhere, or takes it away, since they may have leaned on it, or sets something of the world, as wind."""
+    """Begin to count anew for each body that an order or a rule of the world has changed; for all where an order moves
+    or removes an entity, since they may have leaned on it, or sets a field of the world, as wind."""
     old = before.numbers
     if any(
         isinstance(edit, Remove) or (isinstance(edit, Set) and (edit.field == "position" or edit.name == WORLD))
@@ -98,7 +98,7 @@ def wake_edited(before: Frame, numbers: list[float], edits: Sequence[Edit]) -> N
 
 
 def _pose(entity: Entity, numbers: Sequence[float]) -> list[float]:
-    """Return what `still_pose` holds: position, orientation and the positions of joints, as far as there are such."""
+    """Return the numbers of `still_pose`: position, orientation and positions of joints, where the body has these."""
     offsets = entity.offsets
     found: list[float] = []
     for field in POSE:
@@ -109,7 +109,7 @@ def _pose(entity: Entity, numbers: Sequence[float]) -> list[float]:
 
 
 def is_still(entity: Entity, numbers: Sequence[float]) -> bool:
-    """Whether a body is where its `still_pose` has it."""
+    """Whether a body is at its `still_pose`."""
     at = entity.offsets[STILL_POSE]
     kept, pose = numbers[at : at + entity.counts[STILL_POSE]], _pose(entity, numbers)
     joints = 0

@@ -1,4 +1,4 @@
-"""What the kits and the scene of a deployment bring for rigid bodies: what they feel, and what is wrong with it."""
+"""The physics of a deployment's rigid bodies, by its kits, scene and surfaces, and the problems of these."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from foosim.world.spec import WorldSpec
 
 STANDARD_GRAVITY: Final = 9.80665
 RESTITUTION_NS: Final = 10_000_000
-"""Of substeps: a rebound is right within 5 % up to this, at 40 ms it has 3 % too much energy, at 100 ms 18 %."""
-FELT_BY_NOBODY: Final = ""
-"""The surface of scenery that no rigid body feels."""
+"""The longest substep with a rebound within 5 %; at 40 ms it has 3 % too much energy, at 100 ms 18 %."""
+NO_SURFACE: Final = ""
+"""The surface of scenery without contacts."""
 
 
 def physics_of(spec: WorldSpec) -> Physics:
-    """Return what rigid bodies feel: as the kit says that says so, else as the deployment's physics and surfaces do."""
+    """Return the physics of rigid bodies: that of a kit, else by the deployment's physics and surfaces."""
     found = [physics for _, kit in kits_of(spec) if (physics := kit.physics()) is not None]
-    assert len(found) <= 1, f"{len(found)} kits say what rigid bodies feel"
+    assert len(found) <= 1, f"{len(found)} kits define the physics of rigid bodies"
     return found[0] if found else physics_from(spec.physics, spec.surfaces)
 
 
 def gravity_of(spec: WorldSpec) -> float:
-    """Return what everything falls with (m/s2)."""
+    """Return the acceleration of gravity (m/s2)."""
     return physics_of(spec).gravity
 
 
 def findings_of(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what is wrong with the world as a whole: who says what rigid bodies feel, and places.
+    """Yield problems of the world as a whole: the physics of rigid bodies, and places.
 
     Meshes count once their files are there.
     """
     felt = [name for name, kit in kits_of(spec) if kit.physics() is not None]
     for name in felt[1:]:
-        yield Finding((name,), f"says what rigid bodies feel, which {felt[0]} says already", name, at="key")
+        yield Finding((name,), f"defines the physics of rigid bodies, as {felt[0]} does already", name, at="key")
     if felt:
         for key in ("physics", "surfaces"):
             if getattr(spec, key):
-                yield Finding((key,), f"what rigid bodies feel, which {felt[0]} says already", key, at="key")
+                yield Finding((key,), f"the physics of rigid bodies, which {felt[0]} defines already", key, at="key")
     if len(felt) <= 1:
         yield from _unfelt(spec, has_rigid=bool(felt) or _has_rigid(spec))
     if not felt and _has_rigid(spec):
@@ -55,7 +55,7 @@ def _has_rigid(spec: WorldSpec) -> bool:
 
 
 def _too_long(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield that substeps are too long for restitution: in one substep a contact begins and ends."""
+    """Yield a problem of substeps too long for restitution: in one substep a contact begins and ends."""
     least = -(-spec.tick_ns // RESTITUTION_NS)
     bouncy = [name for name, surface in spec.surfaces.items() if surface.restitution > 0.0]
     if bouncy and spec.substeps < least:
@@ -64,7 +64,7 @@ def _too_long(spec: WorldSpec) -> Iterator[Finding]:
 
 
 def _unfelt(spec: WorldSpec, *, has_rigid: bool) -> Iterator[Finding]:
-    """Yield the surfaces of scenery and bodies of which nobody says what rigid bodies feel of them.
+    """Yield the unknown surfaces of scenery and bodies.
 
     Without rigid bodies these are the surfaces that `scenery` names.
     """
@@ -84,7 +84,7 @@ def _unfelt(spec: WorldSpec, *, has_rigid: bool) -> Iterator[Finding]:
                 made.append(((section, name, key), f"{one.model} {name}", [surface], felt.sides))
     for location, what, surfaces, known in made:
         for surface in dict.fromkeys(surfaces):
-            if surface != FELT_BY_NOBODY and surface not in known:
-                valid = f"there are: {', '.join(sorted(known))}; and '' of what no rigid body feels"
+            if surface != NO_SURFACE and surface not in known:
+                valid = f"there are: {', '.join(sorted(known))}; and '' without contacts"
                 nearest = nearest_quoted(surface, known)
                 yield Finding(location, f"{what} has an unknown surface ({valid})", surface, nearest)

@@ -1,8 +1,8 @@
-"""Bodies that stand: what a solve has left as it was, to the last bit, is left so until something changes it.
+"""Unmoved bodies: a body that a solve has not changed, to the last bit, is not solved until an edit or command.
 
-A solve is a function of the state of an island and of what is asked of its motors. So the next solve of a body that
-is alone, whose state the last one has left as it was, and whose actuators ask for what follows from that state alone,
-would leave it so again. Its slot `unmoved` says that the last one did.
+A solve is a function of the state of an island and of the set-points of its motors. So the next solve of a body that
+is alone, that the last one has not changed, and whose set-points follow from its state alone, would not change it
+either. Its slot `unmoved` is 1 after such a solve.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from foosim.world.layout import Entity, Layout
 UNMOVED = "unmoved"
 
 
-class Standing:
-    """Which bodies of a layout may stand: those with the slot, whose actuators say that they are `steady`, without
-    rules of their own."""
+class UnmovedBodies:
+    """The bodies of a layout that may stay unsolved: those with the slot, whose actuators are `steady`, without rules
+    of their own."""
 
     def __init__(
         self, layout: Layout, actuators: Mapping[int, Sequence[BoundActuator]], ruled: Collection[int]
@@ -34,20 +34,20 @@ class Standing:
     def awake(
         self, bodies: Sequence[Entity], alone: Collection[int], numbers: Sequence[float], start: Sequence[float]
     ) -> Sequence[Entity]:
-        """Return the bodies that are solved: `alone` are those that are islands by themselves, `start` the numbers
-        before commands reached them."""
+        """Return the bodies that are solved: `alone` are the islands of one body, `start` the numbers before commands
+        reached them."""
         places, found = self._places, []
         if not places:
             return bodies
         for entity in bodies:
             at, first, last = places.get(entity.index, -1), entity.start, entity.split
-            stands = at >= 0 and numbers[at] == 1.0 and entity.index in alone
-            if not stands or numbers[first:last] != start[first:last]:
+            is_unmoved = at >= 0 and numbers[at] == 1.0 and entity.index in alone
+            if not is_unmoved or numbers[first:last] != start[first:last]:
                 found.append(entity)
         return found
 
     def note(self, solved: Iterable[Entity], numbers: list[float], before: Sequence[float]) -> None:
-        """Say of each body that was solved whether that has left it as it was before."""
+        """Set the slot of each solved body: whether the solve has left it unchanged."""
         for entity in solved if self._places else ():
             at = self._places.get(entity.index, -1)
             if at >= 0:
@@ -56,7 +56,7 @@ class Standing:
                 numbers[at] = 1.0 if numbers[first:last] == before[first:last] else 0.0
 
     def wake_edited(self, before: Frame, numbers: list[float]) -> None:
-        """Let those be solved that an order or a rule of the world has changed."""
+        """Let bodies be solved that an order or a rule of the world has changed."""
         old = before.numbers
         for entity, at in self._having:
             if numbers[at] == 0.0:

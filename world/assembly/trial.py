@@ -1,7 +1,7 @@
-"""A tick of components of other packages, tried when a deployment is loaded: one that raises is a problem of the file.
+"""A trial tick of components of other packages when a deployment is loaded: an exception is a problem of the file.
 
-Objects are made for the trial and thrown away, and the numbers are copies. What a component returns is checked where a
-run checks it. Worlds of foosim's own components are not tried: tests do that.
+Objects are built for the trial and dropped, and the numbers are copies. Returned values are checked where a run checks
+them. Worlds of foosim's own components have no trial: tests do that.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ TICK: Final = 1
 
 
 def trial_findings(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield why the first of a world's components that fails does so, at its place in the deployment."""
+    """Yield the error of the first of a world's components that fails, at its place in the deployment."""
     try:
         _try_tick(spec, build_layout(spec))
     except KeyboardInterrupt:
@@ -45,12 +45,12 @@ def trial_findings(spec: WorldSpec) -> Iterator[Finding]:
     except ComponentError as error:
         place = _place_of(spec, error)
         yield Finding(place, str(error), place[-1] if place else ABSENT, at="key" if place else "value")
-    except BaseException as error:  # noqa: BLE001  # other people's code may raise anything: SystemExit, too
+    except BaseException as error:  # noqa: BLE001  # user code may raise anything: SystemExit, too
         yield Finding((), f"the trial of the components fails: {failure_of(error)}", ABSENT)
 
 
 def _place_of(spec: WorldSpec, error: ComponentError) -> Location:
-    """Return where a deployment has the component that failed; nothing where it does not name it."""
+    """Return the place of the component that failed in the deployment; empty where the deployment does not name it."""
     kind, _, name = error.component.partition(" ")
     if kind in ("kit", "scene"):
         return (name,) if kind == "kit" else ("scene",)
@@ -69,14 +69,14 @@ def _place_of(spec: WorldSpec, error: ComponentError) -> Location:
 
 
 def _try_tick(spec: WorldSpec, layout: Layout) -> None:
-    """Make all components and call what a run calls of them in a tick, first of all what motions rest on: bodies."""
+    """Build all components and call the methods that a run calls in a tick, bodies first: motions need them."""
     if spec.scene is not None:
         called(f"scene {spec.scene.kind}", "", 0, scene_shapes, spec)
     for name, section in sorted(spec.kits.items()):
-        called(f"kit {name}", "", 0, _ask_kit, spec.kit_types[name].factory, section, spec)
+        called(f"kit {name}", "", 0, _try_kit, spec.kit_types[name].factory, section, spec)
     build_scene(spec, layout)
-    world = World(spec, layout, is_watched=True)
-    start = initial_numbers(spec, layout, world.models, is_watched=True)
+    world = World(spec, layout, is_guarded=True)
+    start = initial_numbers(spec, layout, world.models, is_guarded=True)
     sensors = [sensor for robot in layout.robots for sensor in sensors_of(spec, layout, robot)]
     for some in (*([sensor] for sensor in sensors), sensors):
         _sample(some, start)
@@ -98,7 +98,7 @@ def _try_tick(spec: WorldSpec, layout: Layout) -> None:
         assert not text.startswith((NO_STATUS, NO_TEXT)), text
 
 
-def _ask_kit(factory: Any, section: Any, spec: WorldSpec) -> None:
+def _try_kit(factory: Any, section: Any, spec: WorldSpec) -> None:
     kit = factory(section, spec)
     kit.physics()
     for _ in (*kit.shapes(), *kit.findings()):

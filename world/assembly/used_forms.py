@@ -1,7 +1,7 @@
-"""Which forms a world is made of, and the versions of those that are not foosim's own.
+"""The forms of a world, and the versions of forms of other packages.
 
-Two nodes with different versions of a form would compute different worlds, and a capture is only repeated by the form
-that it was made with.
+Two nodes with different versions of a form would compute different worlds, and a capture is only repeated by the
+version of its run.
 
 A version depends on a component's module, those of its base classes, and what these import of their own: modules of
 their top-level package, and of its folder where modules lie beside each other. Imports are read from the source, so
@@ -31,7 +31,7 @@ DIGEST_BYTES: Final = 8
 
 
 def forms_of(spec: WorldSpec) -> list[ComponentType]:
-    """Return the forms that a world is made of, each once, by form and name."""
+    """Return the forms of a world, each once, by form and name."""
     found = {(form.type_name, form.name): form for form in _forms_of(spec)}
     return [form for _, form in sorted(found.items())]
 
@@ -63,7 +63,7 @@ def _with_modifiers(settings: SensorSettings | ActuatorSettings) -> Iterator[Com
 
 
 def foreign_versions(spec: WorldSpec) -> dict[str, str]:
-    """Return the versions of the forms of a world that are not foosim's own, by form and class.
+    """Return the versions of the forms of a world that other packages bring, by form and class.
 
     A version is a digest of the sources.
     """
@@ -83,7 +83,7 @@ def _version(made: Callable[..., Any]) -> str:
 
 
 def sources_of(made: Any) -> dict[str, bytes]:
-    """Return the sources that a form is made of, by module: text, or the bytes of what is compiled."""
+    """Return the sources of a form, by module: text, or the bytes of a compiled module."""
     bases = [base.__module__ for base in getattr(made, "__mro__", ())]
     modules = [module for module in (made.__module__, *bases) if _is_foreign(module)]
     found: dict[str, bytes] = {}
@@ -107,18 +107,18 @@ def _top(module: str) -> str:
 
 @cache
 def _spec(module: str) -> ModuleSpec | None:
-    with suppress(Exception):  # a parent that is none, a module without a description
+    with suppress(Exception):  # a parent without submodules, a module without a spec
         return find_spec(module)
     return None
 
 
 @cache
 def _source(module: str) -> bytes:
-    """Return the source of a module, or its file as it is where there is none; nothing of a namespace."""
+    """Return the source of a module, or the bytes of its file without source; nothing of a namespace."""
     spec = _spec(module)
     loader: Any = None if spec is None else spec.loader
     text = None
-    with suppress(Exception):  # of a loader that can do anything
+    with suppress(Exception):  # a loader may raise anything
         text = loader.get_source(module)
     if text is not None:
         return str(text).encode()
@@ -132,7 +132,7 @@ def _imports(module: str) -> tuple[str, ...]:
     """Return the modules that one may import, and the packages that it is in."""
     spec = _spec(module)
     found = dict.fromkeys(_parents(module))
-    with suppress(SyntaxError, ValueError):  # of what is compiled
+    with suppress(SyntaxError, ValueError):  # of a compiled module
         for node in ast.walk(ast.parse(_source(module))):
             for name in _names(node, "" if spec is None else spec.parent or ""):
                 found |= dict.fromkeys([*_parents(name), name])
@@ -165,7 +165,7 @@ def _belongs(other: str, module: str) -> bool:
 
 @cache
 def _folder(top: str) -> str:
-    """Return the folder in which a module or package lies; empty where that is not known."""
+    """Return the folder of a module or package; empty where it is unknown."""
     spec = _spec(top)
     if spec is None:
         return ""

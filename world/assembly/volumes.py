@@ -1,11 +1,10 @@
 """Bounding volumes of rigid bodies of any kind, and the islands that follow from them.
 
 The volume of a body is the box around its shapes, grown by its declared speed limit x tick, or by twice its present
-speed x tick where that is more; that of a body on a fixed
-base is the box around all that its joints let it reach. The volume of a robot with a gripper has the reach of that,
-too. Bodies whose volumes overlap are an island, and so are what holds and what is held. Movers (bodies that
-go on by a motion) are in no island: each island has those in whose way it is. Everything follows from the frame; only
-+ - x / sqrt and comparisons, element by element, so that all CPUs agree.
+speed x tick where that is more; that of a body on a fixed base is the box around the reach of its joints. The volume of
+a robot with a gripper includes the gripper's reach. Bodies whose volumes overlap are an island, and so are a holder and
+the held entity. Movers (bodies that a motion moves) are in no island: each island has the movers near it. Everything
+follows from the frame; only + - x / sqrt and comparisons, element by element, so that all CPUs agree.
 """
 
 from __future__ import annotations
@@ -34,9 +33,9 @@ Numbers: TypeAlias = NDArray[np.float64]
 MARGIN_M: Final = 0.001
 """Added to each volume: contacts are found up to Bullet's breaking threshold of 1 mm."""
 PRESENT_SPEED: Final = 2.0
-"""Within a tick a body gets no farther than at its declared speed limit, or at so many times its present speed."""
+"""Within a tick a body moves at most at its declared speed limit, or at this multiple of its present speed."""
 FEW: Final = 16
-"""Boxes that are swept along x, whatever they do: to look for a better axis would cost more."""
+"""The count of boxes that are always swept along x: to look for a better axis would cost more."""
 SKIN_M: Final = 0.05
 """Which boxes may overlap is looked up anew when a side of one is this far from where it was then."""
 X, Y, Z, W = range(4)
@@ -102,7 +101,7 @@ def _felt_of(entity: Entity, body: Body) -> _Felt:
 
 
 def is_felt(body: Body, physics: Physics) -> bool:
-    """Whether rigid bodies feel a body: it has a shape, and all of its shapes have surfaces that they know."""
+    """Whether a body has contacts: it has a shape, and all of its shapes have known surfaces."""
     surfaces = [shape.surface for link in body.links for shape in link.shapes]
     return bool(surfaces) and all(surface in physics.sides for surface in surfaces)
 
@@ -123,18 +122,18 @@ class Volumes:
         for one in grippers_of(spec, layout):
             grippers.setdefault(one.robot, []).append(one)
         self._grippers = [(index, one.held) for index, its in grippers.items() for one in its]
-        """Of each gripper its robot, and the place of the reference to what it holds."""
+        """Of each gripper its robot, and the place of the reference to the held entity."""
         self._all = [_felt_of(entity, reaching(body, grippers.get(entity.index, ()))) for entity, body in felt]
         self._all_alone = [
             (entity.index, entity.name if entity.is_robot else "")
             for entity in layout.entities
             if entity.is_solved and not entity.is_rigid
         ]
-        """Movers and others that touch nobody: each is solved by itself."""
+        """Movers and other entities without contacts: each is solved by itself."""
         self._take(self._all, self._all_alone)
 
     def without(self, absent: Collection[int]) -> Volumes:
-        """Return those of all but some entities, by their indices."""
+        """Return the volumes of all but some entities, by their indices."""
         found = copy(self)
         found._take(
             [one for one in self._all if one.entity.index not in absent],
@@ -143,7 +142,7 @@ class Volumes:
         return found
 
     def _take(self, felt: Sequence[_Felt], alone: list[tuple[int, str]]) -> None:
-        """Be the volumes of these."""
+        """Set the entities of the volumes."""
         self._entities = [one.entity for one in felt]
         self.rows = {entity.index: row for row, entity in enumerate(self._entities)}
         """The row of each entity in `boxes_at`."""
@@ -170,7 +169,7 @@ class Volumes:
         self._near: _Near | None = None
 
     def islands(self, numbers: Sequence[float]) -> list[BodyIsland]:
-        """Return the islands of an edited frame, and those that move alone, in the order of their first entities.
+        """Return the islands of an edited frame, and entities that move alone, in the order of their first entities.
 
         It is the same list as the last one where it is equal to that.
         """
@@ -190,7 +189,7 @@ class Volumes:
         return self._found[1]
 
     def _held(self, numbers: Sequence[float]) -> list[tuple[int, int]]:
-        """Return the rows of those who hold, and of what they hold, whether their volumes overlap or not."""
+        """Return the rows of holders and of held entities, whether their volumes overlap or not."""
         rows, found = self.rows, []
         for robot, at in self._grippers:
             held = int(numbers[at])
@@ -316,12 +315,12 @@ def _move_places(entity: Entity) -> list[int]:
 
 
 def reach_speed(speed_limit: float, present: float) -> float:
-    """Return the speed (m/s) with which a body may go on for a tick, from its promise and its present speed."""
+    """Return the greatest speed (m/s) of a body within a tick, from its promise and its present speed."""
     return max(speed_limit, PRESENT_SPEED * present)
 
 
 def radius_of(body: Body) -> float:
-    """Return how far a part of a free body can be from its centre of mass (m)."""
+    """Return the greatest distance of a part of a free body from its centre of mass (m)."""
     middle, half = _own_box(body)
     x, y, z = (abs(a) + b for a, b in zip(middle, half, strict=True))
     return sqrt(x * x + y * y + z * z)
@@ -358,6 +357,6 @@ def _root(group: list[int], row: int) -> int:
 
 
 def _join(group: list[int], one: int, other: int) -> None:
-    """Make two rows be of one group, whose root is its lowest row."""
+    """Unite the groups of two rows; the root is the lowest row."""
     low, high = sorted((_root(group, one), _root(group, other)))
     group[high] = low

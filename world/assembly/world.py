@@ -1,4 +1,4 @@
-"""A deployment's world in the frames of one layout: its models, rules, motions and actuators, made from their forms."""
+"""A deployment's world in the frames of one layout: its models, rules, motions and actuators."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ from foosim.world.scene import Body, Scene
 from foosim.world.spec import WorldSpec
 
 NO_FORCE: Final = (0.0, 0.0)
-"""What is asked of the motor of a joint that nothing drives."""
+"""The set-point of the motor of a joint without a drive."""
 NO_STATUS: Final = "no status of"
 NO_TEXT: Final = "no text of"
 FAILED: Final = "failed"
-"""The kind of the mark of a rule whose marks cannot be told."""
+"""The kind of the mark of a rule whose own marks failed."""
 FAILED_LOOK: Final = MarkKind("lost", "forms that failed")
 EVENT: Final = "event"
 EVENT_LOOK: Final = MarkKind("away", "events of the world", is_cut=True)
 TOGETHER_MIN: Final = 32
-"""Actuators from which on they are asked together: fewer are asked one after the other in less time."""
+"""The least count of actuators that are called together: fewer take less time one after the other."""
 
 
 _Alike: TypeAlias = tuple[type[Motion], type[Any]]
@@ -53,8 +53,8 @@ _Alike: TypeAlias = tuple[type[Motion], type[Any]]
 
 
 class _Moving(NamedTuple):
-    """Entities that are solved in a tick, and those of them that a motion moves: by motion, with what asks their motors
-    at once, or None where each is asked by itself."""
+    """Entities that are solved in a tick, and their groups by motion, each with the `together` object of its actuators,
+    or None where each actuator is called by itself."""
 
     entities: list[Entity]
     groups: list[tuple[type[Motion], list[Entity], Any]]
@@ -101,12 +101,12 @@ def build_scene(spec: WorldSpec, layout: Layout) -> Scene:
 
 
 def initial_numbers(
-    spec: WorldSpec, layout: Layout, models: Mapping[int, Model] | None = None, *, is_watched: bool = False
+    spec: WorldSpec, layout: Layout, models: Mapping[int, Model] | None = None, *, is_guarded: bool = False
 ) -> list[float]:
-    """Return the numbers of a world at tick 0: each entity as its model places it, then what its rules set, then
-    those of the world; spares are parked.
+    """Return the numbers of a world at tick 0: each entity as its model places it, then the numbers of its rules,
+    then those of the rules of the world; spares are parked.
 
-    `models` are those of the layout where they are made already. `is_watched`: rules that write to them otherwise than
+    `models` are those of the layout where they exist already. `is_guarded`: rules that write to them otherwise than
     by their views are errors (`watching`). Raises ComponentError.
     """
     numbers = [0.0] * layout.size
@@ -118,9 +118,9 @@ def initial_numbers(
         called(f"model {entity.model}", entity.name, 0, model.place, view)
     for robot in layout.robots:
         for label, own in entity_rules_of(spec, layout, robot, "place"):
-            called(f"rule {label}", robot.name, 0, (guarded(own) if is_watched else own).place, view)
+            called(f"rule {label}", robot.name, 0, (guarded(own) if is_guarded else own).place, view)
     for label, rule in rules_of(spec, layout).items():
-        called(f"rule {label}", WORLD, 0, (guarded(rule) if is_watched else rule).place, view)
+        called(f"rule {label}", WORLD, 0, (guarded(rule) if is_guarded else rule).place, view)
     for name in layout.spares:
         entity = layout[name]
         numbers[entity.start : entity.stop] = parked(layout, entity)
@@ -128,7 +128,7 @@ def initial_numbers(
 
 
 def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
-    """Return what rules and kits show of a frame, and the commands that its robots clamped and refused, for JSON."""
+    """Return the status of rules and kits in a frame, and its counts of clamped and refused commands, as JSON."""
     view = View(frame.tick, frame.numbers)
     status: dict[str, Any] = {"commands": count_commands(frame)}
     shown: list[tuple[str, Any, Any]] = [
@@ -146,14 +146,14 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
 
 
 def count_commands(frame: Frame) -> dict[str, int]:
-    """Return how many commands the robots of a frame have clamped and refused."""
+    """Return the counts of commands that the robots of a frame have clamped and refused."""
     robots, values = frame.layout.robots, frame.values
     return {key: int(sum(values[robot.offsets[key]] for robot in robots)) for key in ("clamped", "refused")}
 
 
 def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
-    """Return in words what rules and kits show, and the commands that were not taken as they came, from what
-    `world_status` returned."""
+    """Return in words the status of rules and kits, and the counts of clamped and refused commands, by the result of
+    `world_status`."""
     made: list[Any] = [settings.component_type.factory for settings in spec.world_rules.values()]
     made += [kit.factory for kit in spec.kit_types.values()]
     found = [status["failed"]] if "failed" in status else []
@@ -169,7 +169,7 @@ def world_texts(spec: WorldSpec, status: Mapping[str, Any]) -> list[str]:
 
 
 def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
-    """Return the kinds of what rules mark, by name."""
+    """Return the kinds of the marks of rules, by name."""
     made: list[Any] = [settings.component_type.factory for settings in spec.world_rules.values()]
     made += [rule.component_type.factory for _, robot in sorted(spec.robots.items()) for rule in robot.rules.values()]
     own = {name: kind for one in dict.fromkeys(made) for name, kind in one.mark_kinds.items()}
@@ -177,7 +177,7 @@ def mark_kinds(spec: WorldSpec) -> dict[str, MarkKind]:
 
 
 class WorldMarks:
-    """What the rules of a world did between frames."""
+    """The marks of a world's rules between frames."""
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self._rules: dict[tuple[str, str], Any] = {
@@ -192,9 +192,9 @@ class WorldMarks:
         self._events = events_by_tick(spec)
 
     def between(self, before: Frame, after: Frame) -> list[Marked]:
-        """Return what happened after one frame, up to a later one.
+        """Return the marks after one frame, up to a later one.
 
-        A rule that raises, or gives something else than marks, is left out from then on, and a mark says so.
+        A rule that raises, or returns something else than marks, is left out from then on, with a mark.
         """
         found: list[Marked] = []
         if self._events:
@@ -218,10 +218,10 @@ def _marks_of(rule: Any, before: Frame, after: Frame) -> list[Marked]:
 
 
 class World:
-    """What computes the ticks of one layout, but for the engine. Raises ComponentError for a form that raises."""
+    """The computation of one layout's ticks, except the engine. Raises ComponentError for a form that raises."""
 
-    def __init__(self, spec: WorldSpec, layout: Layout, *, is_watched: bool = False) -> None:
-        """`is_watched`: forms that write to the frame otherwise than by their views are errors (`watching`)."""
+    def __init__(self, spec: WorldSpec, layout: Layout, *, is_guarded: bool = False) -> None:
+        """`is_guarded`: forms that write to the frame otherwise than by their views are errors (`watching`)."""
         self._spec, self._layout = spec, layout
         self.models: dict[int, Model] = models_of(spec, layout)
         self._rules = rules_of(spec, layout)
@@ -230,7 +230,7 @@ class World:
         self.actuators: Mapping[int, tuple[BoundActuator, ...]] = {
             index: actuators for index, actuators in fitted.items() if actuators
         }
-        """What moves each robot that has actuators, by the entity's index."""
+        """The actuators of each robot with some, by the entity's index."""
         self._only = {index: its[0] for index, its in fitted.items() if len(its) == 1 and its[0].joints is None}
         """The actuators that alone command all motors of their robots, by the entity's index."""
         self._motions = _motions_of(spec, layout)
@@ -244,18 +244,18 @@ class World:
         )
         """Entities whose actuators may have jobs, by their indices."""
         self._powers: dict[int, list[tuple[str, Any]]] = {}
-        """The rules that say whether an entity's drives have power, by its index."""
+        """The rules with a switch of an entity's power, by its index."""
         for index, its in self._entity_rules.items():
             for label, rule in its:
                 if overrides(type(rule), "has_power"):
                     self._powers.setdefault(index, []).append((label, rule))
         self._alike: dict[_Alike, list[Any]] = {}
-        """The actuators that can be asked together."""
+        """The actuators that can be called together."""
         self._rows: dict[int, tuple[_Alike, int]] = {}
-        """Which of them is that of a robot, by the entity's index."""
-        self._asking: dict[_Alike, Any] = {}
-        """What all of them are together, where some were asked."""
-        for index, one in () if is_watched else self._only.items():
+        """The row of a robot's actuator in these, by the entity's index."""
+        self._joined: dict[_Alike, Any] = {}
+        """The `together` object of all of them, where it was needed."""
+        for index, one in () if is_guarded else self._only.items():
             motion = layout.entities[index].kind.motion
             if motion is None or not motion.takes_arrays:
                 continue
@@ -265,8 +265,8 @@ class World:
                 self._rows[index] = key, len(members)
                 members.append(one.actuator)
         own = {index: type(model) for index, model in self.models.items()}
-        if is_watched:
-            self._watch()
+        if is_guarded:
+            self._guard()
         self._checks: Mapping[int, Callable[[Sequence[float], Sequence[float]], bool]] = {
             index: self.models[index].is_plausible for index, kind in own.items() if overrides(kind, "is_plausible")
         }
@@ -276,8 +276,8 @@ class World:
             if entity.is_rigid and overrides(own[entity.index], "derive")
         }
 
-    def _watch(self) -> None:
-        """Give all forms numbers of the frame that they can only read."""
+    def _guard(self) -> None:
+        """Give all forms read-only numbers of the frame."""
         self.models = {index: guarded(model) for index, model in self.models.items()}
         self._rules = {label: guarded(rule) for label, rule in self._rules.items()}
         self.actuators = {index: tuple(map(guarded_actuator, its)) for index, its in self.actuators.items()}
@@ -288,7 +288,7 @@ class World:
         }
 
     def apply_rules(self, numbers: list[float], tick: int) -> None:
-        """Edit a frame's numbers by the rules of the world, in name order, with all their memory in the frame."""
+        """Edit a frame's numbers by the rules of the world, in name order, with all their state in the frame."""
         view = WritableView(tick, numbers)
         for label, rule in self._rules.items():
             try:
@@ -304,7 +304,7 @@ class World:
         tick: int,
         values: NDArray[np.float64] | None = None,
     ) -> None:
-        """Move those of these entities whose models have motions.
+        """Move these entities, as far as their models have motions.
 
         `start` are the numbers at the tick's start, `values` the same as an array where there is one already.
         """
@@ -312,18 +312,18 @@ class World:
             self._moving = self._moving_of(entities)
         if not self._moving.groups:
             return
-        view, asking = WritableView(tick, start, None, numbers, values), View(tick, numbers, start=start)
+        view, driving = WritableView(tick, start, None, numbers, values), View(tick, numbers, start=start)
         for kind, moved, together in self._moving.groups:
-            asked: Any = (
-                self.motors(moved, asking)
+            commands: Any = (
+                self.motors(moved, driving)
                 if together is None
-                else asked_together(f"actuators of the motion {kind.__name__}", together, len(moved), asking)
+                else commands_together(f"actuators of the motion {kind.__name__}", together, len(moved), driving)
             )
             try:
-                self._motions[kind].move(moved, asked, view)
+                self._motions[kind].move(moved, commands, view)
             except BaseException as error:
                 if not isinstance(error, KeyboardInterrupt) and together is None:
-                    self.check_motors(moved, asked, tick)
+                    self.check_motors(moved, commands, tick)
                 raise component_error(f"motion {kind.__name__}", "", tick, error) from error
 
     def _moving_of(self, entities: Sequence[Entity]) -> _Moving:
@@ -331,19 +331,19 @@ class World:
         return _Moving(list(entities), [(kind, moved, self._together(kind, moved)) for kind, moved in groups.items()])
 
     def _together(self, motion: type[Motion], entities: Sequence[Entity]) -> Any:
-        """Return what asks the motors of all of these entities at once; None where each is asked by itself."""
+        """Return the `together` object of these entities' actuators; None where each is called by itself."""
         found = [self._rows.get(entity.index) for entity in entities]
         rows = [one for one in found if one is not None]
         if len(rows) < max(TOGETHER_MIN, len(found)) or len({key for key, _ in rows}) > 1:
             return None
         what, (key, _) = f"actuators of the motion {motion.__name__}", rows[0]
         members = self._alike[key]
-        if key not in self._asking:
-            self._asking[key] = called(what, "", 0, type(members[0]).together, members)
-        return some_together(what, 0, self._asking[key], members, np.array([row for _, row in rows]))
+        if key not in self._joined:
+            self._joined[key] = called(what, "", 0, type(members[0]).together, members)
+        return some_together(what, 0, self._joined[key], members, np.array([row for _, row in rows]))
 
     def motors(self, entities: Iterable[Entity], view: View) -> list[Motors]:
-        """Return what the actuators of each of these entities ask of its motors, in the order of their channels."""
+        """Return the set-points of the motors of each of these entities, in the order of their actuators' channels."""
         found: list[Motors] = []
         for entity in entities:
             one = self._only.get(entity.index)
@@ -357,7 +357,7 @@ class World:
         return found
 
     def drives(self, entities: Iterable[Entity], view: View) -> tuple[Drives, ...]:
-        """Return what the actuators of each of these rigid bodies ask of its motors and of its base."""
+        """Return the set-points of the motors and the wrench on the base of each of these rigid bodies."""
         return tuple([self._drives(entity, view) for entity in entities])
 
     def _drives(self, entity: Entity, view: View) -> Drives:
@@ -369,9 +369,9 @@ class World:
         has_power = self._has_power(entity, view)
         for one in fitted:
             try:
-                asked = one.actuator.command(view) if has_power else _without_power(one, view)
-                joints = range(len(asked)) if one.joints is None else one.joints
-                for joint, motor in zip(joints, asked, strict=True):
+                commands = one.actuator.command(view) if has_power else _without_power(one, view)
+                joints = range(len(commands)) if one.joints is None else one.joints
+                for joint, motor in zip(joints, commands, strict=True):
                     motors[joint] = Motor(*motor)
                 if has_power and (force := one.actuator.wrench(view)) is not None:
                     wrench = added(wrench, force)
@@ -380,7 +380,7 @@ class World:
         return Drives(tuple(motors), wrench)
 
     def _has_power(self, entity: Entity, view: View) -> bool:
-        """Whether all rules of an entity that say so say that its drives have power."""
+        """Whether the drives of an entity have power by all of its rules with a switch of power."""
         for label, rule in self._powers.get(entity.index, ()):
             try:
                 answer = rule.has_power(view)
@@ -393,7 +393,7 @@ class World:
         return True
 
     def derive(self, entities: Iterable[Entity], numbers: list[float], tick: int) -> None:
-        """Let the models of these rigid bodies write what follows from their new state, where that is finite."""
+        """Let the models of these rigid bodies write their derived fields after a finite new state."""
         if not self._derive:
             return
         view = WritableView(tick, numbers)
@@ -406,9 +406,9 @@ class World:
             except BaseException as error:
                 raise component_error(f"model {entity.model}", entity.name, tick, error) from error
 
-    def check_motors(self, entities: Sequence[Entity], asked: Sequence[Any], tick: int) -> None:
-        """Check what actuators have asked of motors, after whoever was to do it could not. Raises ComponentError."""
-        for entity, motors in zip(entities, asked, strict=True):
+    def check_motors(self, entities: Sequence[Entity], commands: Sequence[Any], tick: int) -> None:
+        """Check the set-points of motors after the engine or motion failed with them. Raises ComponentError."""
+        for entity, motors in zip(entities, commands, strict=True):
             actuators = [one for one in self.actuators.get(entity.index, ()) if one.moves]
             if not actuators:
                 continue
@@ -419,27 +419,27 @@ class World:
                 raise actuators[0].failed(tick, error) from error
 
     def _motors_of_several(self, entity: Entity, view: View) -> Motors:
-        """Return what all actuators of an entity ask; joints that none of them commands are free."""
+        """Return the set-points by all actuators of an entity; joints without an actuator are free."""
         has_power = self._has_power(entity, view)
         fitted = self.actuators.get(entity.index, ())
         by_joint = any(one.joints is not None for one in fitted)
-        asked: list[tuple[float, ...]] = [NO_FORCE] * entity.counts.get("joint_positions", 0) if by_joint else []
+        commands: list[tuple[float, ...]] = [NO_FORCE] * entity.counts.get("joint_positions", 0) if by_joint else []
         for one in fitted:
             try:
                 motors = one.actuator.command(view) if has_power else _without_power(one, view)
                 if one.joints is None:
-                    asked.extend(motors)
+                    commands.extend(motors)
                     continue
                 for joint, motor in zip(one.joints, motors, strict=True):
-                    asked[joint] = motor
+                    commands[joint] = motor
             except BaseException as error:
                 raise one.failed(view.tick, error) from error
-        return tuple(asked)
+        return tuple(commands)
 
     def apply_entity_rules(
         self, entities: Iterable[Entity], start: Sequence[float], numbers: list[float], tick: int
     ) -> None:
-        """Let the rules of these entities write what follows from their new state."""
+        """Apply the rules of these entities after their new state."""
         if not self._entity_rules:
             return
         view = WritableView(tick, numbers, start)
@@ -451,7 +451,7 @@ class World:
                     raise component_error(f"rule {label}", entity.name, tick, error) from error
 
     def judge_jobs(self, entities: Iterable[Entity], start: Sequence[float], numbers: list[float], tick: int) -> None:
-        """Let jobs of these entities end, which now may be done, after their rules."""
+        """End jobs of these entities that are done, after their rules."""
         if not self.having_jobs:
             return
         view = WritableView(tick, numbers, start)
@@ -464,7 +464,7 @@ class World:
     def are_plausible(
         self, entities: Iterable[Entity], numbers: Sequence[float], before: Sequence[float], tick: int
     ) -> bool:
-        """Whether the new, finite states of all of these entities can be; `problem` says what is wrong with one."""
+        """Whether the new, finite states of all of these entities are valid; `problem` has the reason of one."""
         for entity in entities:
             check = self._checks.get(entity.index)
             try:
@@ -475,7 +475,7 @@ class World:
         return True
 
     def problem(self, entity: Entity, numbers: Sequence[float], before: Sequence[float], tick: int) -> str:
-        """Return in words why the new, finite state of an entity cannot be; empty where it can."""
+        """Return in words why the new, finite state of an entity is invalid; empty for a valid one."""
         check = self._checks.get(entity.index)
         if check is None:
             return ""
@@ -488,7 +488,7 @@ class World:
         return "" if is_plausible else "its new state is not within its bounds, speed limits and reach"
 
     def excite(self, numbers: list[float]) -> None:
-        """Set a world at rest in motion, for the fixed small run that tells engines apart. Raises ComponentError."""
+        """Set a world at rest in motion, for the fixed small run that distinguishes engines. Raises ComponentError."""
         view = WritableView(0, numbers)
         for index, model in self.models.items():
             entity = self._layout.entities[index]
@@ -502,7 +502,7 @@ class World:
 
 
 def _by_motion(entities: Iterable[Entity]) -> dict[type[Motion], list[Entity]]:
-    """Return those of these entities that motions move, by motion, in the order of their names."""
+    """Return the entities that motions move, by motion, in the order of their names."""
     groups: dict[type[Motion], list[Entity]] = {}
     for entity in entities:
         if entity.kind.motion is not None:
@@ -519,42 +519,42 @@ def _motions_of(spec: WorldSpec, layout: Layout) -> dict[type[Motion], Motion]:
     return motions
 
 
-def asked_together(what: str, together: Any, count: int, view: View) -> NDArray[np.float64]:
-    """Return what the actuators of so many entities ask of their motors at once, of shape (entities, motors, 2).
+def commands_together(what: str, together: Any, count: int, view: View) -> NDArray[np.float64]:
+    """Return the set-points by the actuators of `count` entities at once, of shape (entities, motors, 2).
 
     `what` names them, for errors. Raises ComponentError.
     """
     try:
-        asked = together.command(view)
-        if isinstance(asked, np.ndarray) and asked.dtype == np.float64 and asked.shape[0::2] == (count, 2):
-            return asked
-        raise ContractError(together.command, f"an array of float64 of the shape ({count}, motors, 2)", asked)
+        commands = together.command(view)
+        if isinstance(commands, np.ndarray) and commands.dtype == np.float64 and commands.shape[0::2] == (count, 2):
+            return commands
+        raise ContractError(together.command, f"an array of float64 of the shape ({count}, motors, 2)", commands)
     except BaseException as error:
         raise component_error(what, "", view.tick, error) from error
 
 
 def _without_power(one: BoundActuator, view: View) -> Motors:
-    """Return what an actuator asks of its motors where there is no power: to stand still, with all their force."""
-    asked = one.actuator.unpowered()
-    return tuple((0.0, motor[1]) for motor in one.actuator.command(view)) if asked is None else asked
+    """Return an actuator's set-points of its motors without power: by default a speed of 0 with all their force."""
+    commands = one.actuator.unpowered()
+    return tuple((0.0, motor[1]) for motor in one.actuator.command(view)) if commands is None else commands
 
 
-def are_motors(asked: object, count: int | None) -> bool:
-    """Whether that is what an actuator can ask of so many motors of a rigid body, or of any number of a motion's."""
+def are_motors(commands: object, count: int | None) -> bool:
+    """Whether these are set-points of `count` motors of a rigid body, or of any count (None) of a motion's."""
     lengths = (2,) if count is None else (2, 3)
     return (
-        isinstance(asked, tuple)
-        and count in (None, len(asked))
-        and all(isinstance(one, tuple) and len(one) in lengths for one in asked)
-        and all(isinstance(number, int | float) and isfinite(number) for one in asked for number in one)
-        and all(one[1] >= 0.0 for one in asked)
+        isinstance(commands, tuple)
+        and count in (None, len(commands))
+        and all(isinstance(one, tuple) and len(one) in lengths for one in commands)
+        and all(isinstance(number, int | float) and isfinite(number) for one in commands for number in one)
+        and all(one[1] >= 0.0 for one in commands)
     )
 
 
 def entity_rules_of(
     spec: WorldSpec, layout: Layout, robot: Entity, hook: str = ""
 ) -> tuple[tuple[str, EntityRule], ...]:
-    """Return the rules of a robot by name, in name order: all, or those that override a hook. Raises ComponentError."""
+    """Return the rules of a robot by name, in name order; with a hook only its overriders. Raises ComponentError."""
     rules = []
     for label, settings in sorted(spec.robots[robot.name].rules.items()):
         found: Any = settings.component_type

@@ -1,1 +1,1 @@
-"""What bodies are made of: masses and inertias, convex hulls, and robots that are described by a URDF file."""
+"""Parts of bodies: masses and inertias, convex hulls, and robots from URDF files."""

@@ -4,7 +4,7 @@ Quickhull (Barber, Dobkin, Huhdanpaa, The Quickhull Algorithm for Convex Hulls, 
 farthest outside. On which side of a plane a point lies is decided by whole numbers, of points on a grid of 2^20 steps,
 whose determinants fit int64: many points in one plane, as meshes have them, cannot mislead it. Where points are left
 outside of the greatest number of corners, the hull is scaled about its middle until it holds them, too. So it holds all
-points, to a few millionths of its length, which is what the grid leaves open.
+points, to a few millionths of its length, the resolution of the grid.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def convex_hull(points: Floats, corners_max: int = CORNERS_MAX) -> Mesh:
 
 
 class _Face:
-    """A triangle of the hull: corners, the neighbour behind each edge (corner i to i + 1), and the points outside."""
+    """A triangle of the hull: corners, the neighbour beyond each edge (corner i to i + 1), and the points outside."""
 
     __slots__ = ("corners", "far", "neighbours", "outside")
 
@@ -87,10 +87,10 @@ class _Building:
         for key in seen:
             del self.faces[key]
         keys = []
-        for one, other, behind in horizon:
+        for one, other, beyond in horizon:
             key = self._add((one, other, corner))
-            face, neighbour = self.faces[key], self.faces[behind]
-            face.neighbours[0] = behind
+            face, neighbour = self.faces[key], self.faces[beyond]
+            face.neighbours[0] = beyond
             edge = next(i for i in range(3) if neighbour.corners[i] == other and neighbour.corners[i - 2] == one)
             neighbour.neighbours[edge] = key
             keys.append(key)
@@ -143,7 +143,7 @@ class _Building:
                 points = points[~out]
 
     def _horizon(self, start: int, corner: int) -> tuple[list[int], list[tuple[int, int, int]]]:
-        """Return the faces that a point sees, and the edges around them (from, to, the face behind)."""
+        """Return the faces that a point sees, and the edges around them (from, to, the face beyond)."""
         point = np.array([corner])
         seen, order, horizon = {start}, [start], []
         for key in order:

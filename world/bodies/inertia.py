@@ -1,6 +1,6 @@
 """Masses, centres of mass and inertia tensors of bodies, in + - * / and square roots alone: equal bits everywhere.
 
-A tensor is xx, xy, xz, yy, yz, zz in kg m2, with the products of inertia as they stand in the matrix (xy is -sum of
+A tensor is xx, xy, xz, yy, yz, zz in kg m2, with the products of inertia as elements of the matrix (xy is -sum of
 m x y). Eigenvectors come from cyclic Jacobi rotations, not from LAPACK, whose bits differ from one library to the next.
 Sources: Golub and Van Loan, Matrix Computations, 4th edition, section 8.5 (rotations); Huygens and Steiner (parallel
 axes); the moments of primitives and of tetrahedra are those of any handbook of mechanics.
@@ -35,9 +35,9 @@ MASS_MIN_KG: Final = 1e-6
 MASS_MAX_KG: Final = 1e6
 GYRATION_MIN_M: Final = 1e-4
 GYRATION_MAX_M: Final = 1e3
-"""Bounds of the radius of gyration, the root of moment over mass: how far from an axis a body's mass is."""
+"""Bounds of the radius of gyration, the root of moment over mass: the distance of a body's mass from an axis (m)."""
 TRIANGLE_SHARE: Final = 0.01
-"""By how much of itself a moment may exceed the sum of both others: files round their numbers."""
+"""The share by which a moment may exceed the sum of both others: files round their numbers."""
 SWEEPS_MAX: Final = 32
 """Sweeps converge quadratically: six are enough for any tensor of float64."""
 NO_TENSOR: Final[Tensor] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -80,7 +80,7 @@ def principal_of(tensor: Tensor) -> Principal:
 def _rotate_away(a: list[list[float]], v: list[list[float]], p: int, q: int) -> None:
     """Make the element p, q of a symmetric matrix 0 by a rotation, which the columns of `v` follow."""
     off = a[p][q]
-    if abs(off) <= 1e-18 * (abs(a[p][p]) + abs(a[q][q])):  # less than the last bit of both says
+    if abs(off) <= 1e-18 * (abs(a[p][p]) + abs(a[q][q])):  # less than the last bit of both
         a[p][q] = a[q][p] = 0.0
         return
     theta = (a[q][q] - a[p][p]) / (2.0 * off)
@@ -194,14 +194,14 @@ def combined(parts: Iterable[MassOf]) -> MassOf:
 
 
 def check_mass(mass: float) -> None:
-    """Raise BadValue for a mass that no body of a robot has."""
+    """Raise BadValue for an invalid mass of a robot's body."""
     if not MASS_MIN_KG <= mass <= MASS_MAX_KG:
         valid = f"valid are {MASS_MIN_KG:g} to {MASS_MAX_KG:g} kg"
         raise BadValue(f"a mass of {mass:g} kg, {valid}; a link without a mass has no inertial")
 
 
 def check_moments(mass: float, moments: Vector) -> None:
-    """Raise BadValue for principal moments that no body of this mass can have.
+    """Raise BadValue for principal moments that are impossible for a body of this mass.
 
     All are above 0; none is more than the sum of both others, which a plate's are equal to; and the mass is neither
     at a point nor farther away than anything reaches.

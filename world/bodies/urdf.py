@@ -1,8 +1,8 @@
 """A robot from a URDF file: a tree of links with masses, joints and convex shapes, as data of a body.
 
-What the file cannot mean here is refused with file, line and what is valid: mimic joints, loops, planar and floating
-joints, plugins, masses and inertias that no body has. What does not concern the body is passed over and noted. Visual
-geometry is not read: what is seen of a robot is what touches. Pure: the contents of files are given.
+Unsupported parts are refused with file, line and the valid choices: mimic joints, loops, planar and floating joints,
+plugins, impossible masses and inertias. Parts that do not concern the body are passed over and noted. Visual geometry
+is not read: a robot is drawn by its collision shapes. Pure: the contents of files are given.
 
 Source of the format: the XML specification of URDF at wiki.ros.org/urdf/XML; `capsule` is an extension that Bullet and
 newer tools of ROS share.
@@ -24,20 +24,20 @@ from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Quaternion, 
 SUFFIX: Final = ".urdf"
 SHAPES_MAX: Final = 256
 KEPT: Final = 32
-"""Files whose robots are remembered."""
+"""The count of files whose robots are kept."""
 NOTED: Final = {
     "transmission": "actuators are the deployment's",
-    "gazebo": "what it says is for another simulator",
+    "gazebo": "it is for another simulator",
     "safety_controller": "limits are the joint's",
     "calibration": "joints are where they are",
     "sensor": "sensors are the deployment's",
-    "visual": "what is seen of a robot are its collision shapes, in the colour of the first visual",
+    "visual": "a robot is drawn by its collision shapes, in the colour of the first visual",
     "self_collision_checking": "contacts are the engine's",
     "contact": "surfaces are the deployment's",
     "friction": "joints have damping alone",
     "texture": "shapes have a colour",
 }
-"""What is passed over, and why."""
+"""Elements that are passed over, and the reasons."""
 KNOWN: Final = {
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "collision"),
@@ -49,7 +49,7 @@ KNOWN: Final = {
 class Robot:
     """A robot as its file describes it. `links` are in their tree's order, from the root, which has a fixed joint.
 
-    `joints` are the names of the joints, one for each link; the root's is empty. `notes` say what was passed over.
+    `joints` are the names of the joints, one for each link; the root's is empty. `notes` name the elements passed over.
     """
 
     name: str
@@ -77,7 +77,7 @@ def meshes_of(path: str, content: bytes) -> tuple[str, ...]:
 
 
 def place_of_mesh(path: str, content: bytes, mesh: str) -> str:
-    """Return `file:line` of where a URDF file names a mesh first."""
+    """Return the `file:line` at which a URDF file names a mesh first."""
     return mesh_paths(_robot_of(path, content))[mesh].place
 
 
@@ -110,7 +110,7 @@ def _read(path: str, content: bytes, meshes: tuple[tuple[str, bytes], ...]) -> R
 def _robot_of(path: str, content: bytes) -> Element:
     robot = read_xml(path, content)
     if any(key.startswith("xmlns:xacro") for key in robot.attributes) and [*_macros(robot)]:
-        raise next(_macros(robot)).error("a file of xacro, which is not expanded: write what `xacro FILE` prints")
+        raise next(_macros(robot)).error("an unexpanded file of xacro: write the output of `xacro FILE`")
     if robot.tag != "robot":
         raise robot.error("no URDF: the outermost element is robot", robot.tag)
     return robot
@@ -124,10 +124,10 @@ def _macros(element: Element) -> Iterator[Element]:
 
 
 def _check_refused(robot: Element) -> None:
-    """Refuse by name what would make another robot of this one if it were passed over."""
+    """Refuse elements by name without which this would be another robot."""
     for element in robot.below("plugin"):
         name = element.attributes.get("filename") or element.attributes.get("name", "")
-        what = "a plugin, which is not loaded: sensors, actuators and rules are the deployment's; remove it here"
+        what = "an unsupported plugin: sensors, actuators and rules are the deployment's; remove it here"
         raise element.error(what, name)
     for element in robot.all_of("loop_joint", "model", "include"):
         raise element.error("not a part of URDF that makes a tree of links", element.tag)
@@ -173,7 +173,7 @@ def _link(link: LinkPart, joint: JointPart | None, index: Mapping[str, int]) -> 
 
 
 def _notes(robot: Element) -> Iterator[str]:
-    """Yield what was passed over, each once, with the lines where it stands."""
+    """Yield the elements that were passed over, each once, with its lines."""
     lines: dict[str, list[int]] = {}
     passed = [(child, robot) for child in robot.children if child.tag not in KNOWN["robot"]]
     for part in robot.all_of("link", "joint"):
@@ -187,7 +187,7 @@ def _notes(robot: Element) -> Iterator[str]:
         lines.setdefault(element.tag, []).append(element.line)
     for tag, where in sorted(lines.items()):
         shown = ", ".join(map(str, where[:8])) + (", ..." if len(where) > 8 else "")
-        why = NOTED.get(tag, "it is not part of what makes a body")
+        why = NOTED.get(tag, "it is not part of a body")
         yield f"{tag} ({'line' if len(where) == 1 else 'lines'} {shown}): {why}"
 
 
@@ -195,10 +195,10 @@ def _notes(robot: Element) -> Iterator[str]:
 
 
 def free_base_problem(robot: Robot) -> str:
-    """Return why a robot cannot have a free base, empty if it can: something has to be there that has a mass."""
+    """Return why a robot cannot have a free base: one needs a mass; empty if it can."""
     if _base_mass(robot).mass > 0.0:
         return ""
-    return f"a free robot whose first link {robot.links[0].name}, with what is fixed to it, has no mass"
+    return f"a free robot whose first link {robot.links[0].name}, with all that is fixed to it, has no mass"
 
 
 def body_of(
@@ -251,7 +251,7 @@ def _base(robot: Robot) -> dict[int, tuple[Vector, Quaternion]]:
 
 
 def _base_mass(robot: Robot) -> MassOf:
-    """Return the mass of the first link with what is fixed to it, in its frame."""
+    """Return the mass of the first link with all that is fixed to it, in its frame."""
     parts = []
     for number, (position, orientation) in _base(robot).items():
         link = robot.links[number]

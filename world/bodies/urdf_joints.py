@@ -1,4 +1,4 @@
-"""Joints of a URDF, and the tree that they make of its links."""
+"""Joints of a URDF, and the tree of its links."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ REFUSED_KINDS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class JointPart:
-    """A joint as its file describes it: between which links, where in its parent, and how it moves."""
+    """A joint as its file describes it: its links, its pose in its parent, and its motion."""
 
     name: str
     line: int
@@ -62,7 +62,7 @@ def read_joint(joint: Element, links: Iterable[str]) -> JointPart:
     name, kind = name_of(joint), text_of(joint, "type")
     if kind not in KINDS:
         hint = f": {REFUSED_KINDS[kind]}" if kind in REFUSED_KINDS else ""
-        raise joint.error(f"a joint that is not there, valid are {', '.join(KINDS)}{hint}", kind)
+        raise joint.error(f"an unknown type of joint, valid are {', '.join(KINDS)}{hint}", kind)
     mimic = joint.one_of("mimic")
     if mimic is not None:
         raise mimic.error("a mimic joint: joints move independently of one another, a controller couples them", name)
@@ -90,7 +90,7 @@ def _end(joint: Element, end: str, links: Sequence[str]) -> str:
 
 
 def _axis(joint: Element) -> Vector:
-    """Return the unit axis of a joint: x if nothing is said."""
+    """Return the unit axis of a joint, by default x."""
     axis = joint.one_of("axis")
     if axis is None:
         return X_AXIS
@@ -131,7 +131,7 @@ def in_tree(
 ) -> list[tuple[LinkPart, JointPart | None]]:
     """Return links from the root on, each with the joint that it hangs on: parents first, in the joints' order.
 
-    Raises AssetError where they make no tree: a link with two parents, several roots, a loop, what nothing moves.
+    Raises AssetError where they are no tree: a link with two parents, several roots, a loop, a part without a mover.
     """
     above: dict[str, JointPart] = {}
     for joint in joints:
@@ -165,7 +165,7 @@ def in_tree(
 
 
 def _check_masses(file: str, tree: Sequence[tuple[LinkPart, JointPart | None]]) -> None:
-    """Refuse joints that would move nothing: links without a mass, with all that is fixed to them."""
+    """Refuse joints without a load: their links, with all that is fixed to them, have no mass."""
     mover: dict[str, JointPart | None] = {}
     moved: dict[str, float] = {}
     for link, joint in tree:
@@ -178,5 +178,5 @@ def _check_masses(file: str, tree: Sequence[tuple[LinkPart, JointPart | None]]) 
             moved[its.name] = moved.get(its.name, 0.0) + link.mass.mass
     for link, joint in tree:
         if joint is not None and joint.kind in MOVING and moved[joint.name] == 0.0:
-            what = f"the joint {joint.name} moves nothing: {link.name}, with what is fixed to it, has no mass"
+            what = f"the joint {joint.name} moves nothing: {link.name}, with all that is fixed to it, has no mass"
             raise AssetError(f"{file}:{link.line}: {what}; it needs an inertial")

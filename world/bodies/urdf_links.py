@@ -69,9 +69,9 @@ class LinkPart:
 
 
 def mesh_paths(robot: Element) -> dict[str, Element]:
-    """Return the files that collision shapes name, in their order, by path, each with where it is named first.
+    """Return the files that collision shapes name, in their order, by path, each with the line that names it first.
 
-    Raises AssetError for what is no path inside the asset folder.
+    Raises AssetError for a path outside of the asset folder.
     """
     found: dict[str, Element] = {}
     for link in robot.all_of("link"):
@@ -175,7 +175,7 @@ def _geometry(shape: Element, files: Mapping[str, bytes]) -> Box | Sphere | Cyli
             return Capsule(extent("radius"), extent("length"))
         case "mesh":
             return _hull(shape, files)
-    raise shape.error("no shape that is known, there are box, sphere, cylinder, capsule, mesh", shape.tag)
+    raise shape.error("an unknown shape, there are box, sphere, cylinder, capsule, mesh", shape.tag)
 
 
 def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
@@ -194,7 +194,7 @@ def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
         points = read_mesh(path, files[path], most).vertices
         return Hull(convex_hull(points * [part / most for part in scale]))
     except AssetError as error:
-        raise mesh.error(f"a mesh that is not acceptable: {error}") from None
+        raise mesh.error(f"an invalid mesh: {error}") from None
     except BadValue as bad:
         raise mesh.error(f"a mesh without a convex hull: {bad.problem}", path) from None
 
@@ -203,7 +203,7 @@ def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
 
 
 def materials_of(robot: Element) -> dict[str, Colour]:
-    """Return the colours of a file's materials, by name: the first one that is given of each."""
+    """Return the colours of a file's materials, by name: the first one of each."""
     found: dict[str, Colour] = {}
     for material in (
         *robot.all_of("material"),

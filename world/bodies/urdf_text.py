@@ -1,4 +1,4 @@
-"""What a robot from a URDF file is, for people and for JSON: its tree, and what a deployment says of it."""
+"""Descriptions of a robot from a URDF file, as text and as JSON: its tree, and its entry in a deployment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WHEELS_MIN = 2
 
 
 def as_json(robot: Robot) -> dict[str, Any]:
-    """Return all that is known of a robot, in SI units; a bound that is not there is null."""
+    """Return the description of a robot as JSON, in SI units; a missing bound is null."""
     return {
         "file": robot.file,
         "name": robot.name,
@@ -65,7 +65,7 @@ def _finite(value: float) -> float | None:
 
 
 def lines(robot: Robot) -> Iterator[str]:
-    """Yield a robot's tree, what was passed over, and what a deployment says of it, for people."""
+    """Yield the lines of a robot's tree, the elements passed over, and its entry in a deployment."""
     moving = len(robot.moving)
     joints = f"{moving} joint{'' if moving == 1 else 's'} that move{'s' if moving == 1 else ''}"
     links = f"{len(robot.links)} link{'' if len(robot.links) == 1 else 's'}"
@@ -86,13 +86,13 @@ def lines(robot: Robot) -> Iterator[str]:
     problem = free_base_problem(robot)
     if problem:
         yield f"with `fixed: false`: {problem}"
-    yield "a deployment says:"
+    yield "in a deployment:"
     yield ""
     yield from snippet(robot).rstrip().split("\n")
 
 
 def snippet(robot: Robot) -> str:
-    """Return what a deployment says of a robot, as YAML."""
+    """Return the entry of a robot in a deployment, as YAML."""
     name = robot.name if is_robot_name(robot.name) else "robot"
     is_fixed = "true" if len(_wheels(robot)) < WHEELS_MIN or free_base_problem(robot) else "false"
     actuators = ", actuators: {joints: {kind: joint_position}}" if robot.moving else ""
@@ -101,7 +101,7 @@ def snippet(robot: Robot) -> str:
 
 
 def _wheels(robot: Robot) -> list[str]:
-    """Return the joints of what may be wheels: links that turn without end, and on which nothing else moves."""
+    """Return the joints of possible wheels: links that turn without end, without moving links on them."""
     carriers = set()
     for link in robot.links:
         if link.joint in MOVING:

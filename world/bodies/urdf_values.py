@@ -43,7 +43,7 @@ def name_of(element: Element) -> str:
 
 
 def text_of(element: Element, key: str) -> str:
-    """Return an attribute that there must be."""
+    """Return a required attribute."""
     text = element.attributes.get(key)
     if text is None:
         raise element.error(f"{element.tag} without {key}")
@@ -74,7 +74,7 @@ def vector_of(element: Element, key: str, most: float, default: Vector | None = 
 
 
 def placed_by(element: Element) -> Placed:
-    """Return the pose that the origin in an element says: turned about fixed x (roll), then y (pitch), then z (yaw)."""
+    """Return the pose of the origin in an element: turned about fixed x (roll), then y (pitch), then z (yaw)."""
     origin = element.one_of("origin")
     if origin is None:
         return UNMOVED
@@ -84,7 +84,7 @@ def placed_by(element: Element) -> Placed:
 
 
 def _number(element: Element, key: str, text: str) -> float:
-    """Return a number; the texts `nan`, `inf` and `1_0`, which Python reads, are none."""
+    """Return a number; the texts `nan`, `inf` and `1_0`, which Python reads, are refused."""
     word = text.strip()
     if len(word) > _NUMBER_LENGTH_MAX or not _NUMBER.fullmatch(word):
         raise element.error(f"{key} of {element.tag} is not a finite number", text)

@@ -66,7 +66,7 @@ class Element:
             yield from child.below(*tags)
 
     def error(self, what: str, value: object = ABSENT, nearest: str | None = None) -> AssetError:
-        """Return the error for something that is not acceptable here."""
+        """Return the error for an invalid part of this element."""
         return AssetError(f"{self.place}: {describe(what, value, nearest)}")
 
 
@@ -82,8 +82,8 @@ def read_xml(name: str, content: bytes) -> Element:
     except expat.ExpatError as error:
         what = reading.cut_off() if error.code in _CUT_OFF else f"no XML, {expat.ErrorString(error.code)}"
         raise AssetError(f"{name}:{error.lineno}: {what}") from None
-    except (LookupError, ValueError) as error:  # an encoding that is not there, or has several bytes a character
-        raise AssetError(f"{name}:1: no XML, {describe('an encoding that is not read', str(error))}") from None
+    except (LookupError, ValueError) as error:  # an unknown encoding, or one with several bytes a character
+        raise AssetError(f"{name}:1: no XML, {describe('an unsupported encoding', str(error))}") from None
     assert reading.root is not None, "expat refuses a document without an element"
     return reading.root
 
@@ -102,17 +102,17 @@ class _Reading:
         self.parser.StartDoctypeDeclHandler = self._doctype
 
     def cut_off(self) -> str:
-        """Return where in the tree the content ends too early."""
+        """Return in words the place in the tree at which the content ends too early."""
         if not self._open:
             return "the file ends here, without an element"
         inner = self._open[-1]
-        return f"the file ends here, in the {inner.tag} of line {inner.line}, which is not closed"
+        return f"the file ends here, in the unclosed {inner.tag} of line {inner.line}"
 
     def _refuse(self, what: str, value: object = ABSENT) -> AssetError:
         return AssetError(f"{self.name}:{self.parser.CurrentLineNumber}: {describe(what, value)}")
 
     def _doctype(self, name: str, *_: object) -> None:
-        raise self._refuse("a document type, which a robot has none of: it may define entities", name)
+        raise self._refuse("a document type: it may define entities, and a robot needs none", name)
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         self._count += 1

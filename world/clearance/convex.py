@@ -1,9 +1,9 @@
-"""By how much two convex bodies overlap: the least way that one of them has to go to be beside the other.
+"""The overlap of two convex bodies: the least displacement of one of them that separates both.
 
-That is how deep the origin lies in the Minkowski difference of both, which is not built: a polytope within it grows
+It is the depth of the origin in the Minkowski difference of both, of which only a polytope inside is built: it grows
 where its surface is nearest to the origin (G. van den Bergen, "Proximity queries and penetration depth computation on
 3D game objects", GDC 2001). It begins with any tetrahedron: as long as the origin is outside, the distance of a face is
-negative, and a direction in which all of the difference is behind the origin parts both. Pure Python, for a look at few
+negative, and a direction with the whole difference on the other side of the origin separates both. Pure Python, for few
 pairs before a run.
 """
 
@@ -34,10 +34,10 @@ from foosim.world.scene import (
 )
 
 GROWTH_MAX: Final = 200
-"""Corners that a polytope gets at most: bodies with edges need a few, round ones of any size less than this."""
+"""The greatest count of a polytope's corners: bodies with edges need a few, round ones of any size less than this."""
 EXACT_M: Final = 1e-6
 EXACT_SHARE: Final = 0.005
-"""Growing ends where the depth is known to this, or to this share of itself."""
+"""Growing ends where the depth is exact to this (m), or to this share of itself."""
 FLAT: Final = 1e-9
 """The sine of the angle between two edges of a face, below which it has no direction."""
 AXES: Final[tuple[Vector, ...]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -128,7 +128,7 @@ def _placed(mesh: Mesh, position: Vector, orientation: Quaternion) -> NDArray[np
 
 
 def overlap_of(one: Convex, other: Convex, tolerance_m: float) -> float:
-    """Return by how much two overlap (m), to `EXACT_M` or `EXACT_SHARE`; 0 where that is no more than a tolerance.
+    """Return the overlap of two bodies (m), to `EXACT_M` or `EXACT_SHARE`; 0 up to a tolerance.
 
     Not both are flat.
     """
@@ -150,7 +150,7 @@ def overlap_of(one: Convex, other: Convex, tolerance_m: float) -> float:
 
 
 class _Face:
-    """A triangle of a polytope: corners, unit normal outwards, how far from the origin its plane is along it."""
+    """A triangle of a polytope: corners, unit normal outwards, the distance of its plane from the origin along it."""
 
     __slots__ = ("corners", "far", "normal")
 
@@ -183,7 +183,7 @@ class _Growing:
         self._next = 0
 
     def reach(self, way: Vector) -> float:
-        """Return how far the difference reaches from the origin along a direction: at most so deep is the origin."""
+        """Return the extent of the difference from the origin along a direction: a bound of the origin's depth."""
         return dot(self._farthest(way), way)
 
     def _farthest(self, way: Vector) -> Vector:
@@ -192,7 +192,7 @@ class _Growing:
         return point
 
     def begin(self) -> None:
-        """Begin with a tetrahedron: the ends along x, then what is farthest across them, and across all three."""
+        """Begin with a tetrahedron: the ends along x, then the farthest points across them, and across all three."""
         a, b = self._farthest(AXES[0]), self._farthest(_back(AXES[0]))
         along = moved(a, b, -1.0)
         least = min(range(3), key=lambda axis: abs(along[axis]))
@@ -205,7 +205,7 @@ class _Growing:
             self._add(corners)
 
     def _away(self, point: Vector, across: Vector) -> Vector:
-        """Return what is farthest from a point along a direction, or against it."""
+        """Return the point that is farthest from a point along a direction, or against it."""
         way = _unit(across)
         assert way is not None, "the ends along a direction are apart"
         one, other = self._farthest(way), self._farthest(_back(way))

@@ -1,10 +1,9 @@
-"""Checks that rigid bodies start beside one another, beside scenery, and beside what moves by kinematics.
+"""Checks that rigid bodies start beside one another, beside scenery, and beside entities that move by kinematics.
 
 Bodies that start in one another are pushed apart by the solver, as far as one tick and their speed limits let it: they
 fly off or come into quarantine. Bodies that touch, as a stack does, are beside one another. Links of one body are not
-compared, since they do not touch; nor what the solver moves on neither side: a base that is fixed may stand in a floor.
-What a kit brings is its own to compare with its scenery. That takes geometry, so it is looked at when all single fields
-are right.
+compared, since they do not touch; nor two shapes that the solver never moves: a fixed base may stand in a floor.
+A kit compares its own entities with its scenery. This takes geometry, so it is done when all single fields are valid.
 """
 
 from __future__ import annotations
@@ -31,18 +30,18 @@ from foosim.world.scene import MOVING, Body, Quaternion, Shape, Vector, place, s
 from foosim.world.spec import WorldSpec
 
 TOUCHING_M: Final = 0.001
-"""Bodies that overlap by no more only touch: so far Bullet itself takes them for touching."""
+"""The greatest overlap of touching bodies (m), as in Bullet itself."""
 TOUCHING_SHARE: Final = 0.05
-"""Small bodies touch as long as they overlap by no more than this share of the thinner one."""
+"""The greatest overlap of small touching bodies, as a share of the thinner one."""
 FOUND_MAX: Final = 128
-"""So many that start in something are looked for, more than a report shows: a fleet in a heap takes no long look."""
+"""The search ends at this count of overlapping bodies, more than a report shows: a fleet in a heap is found soon."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A shape at its place in the world, and whose it is: a number by the order in the file, -1 of scenery.
+    """A shape at its place in the world, and its owner: a number by the order in the file, -1 of scenery.
 
-    `body_at` is where the body is that it is of: the origin of its first link. `moves`: the solver moves it.
+    `body_at` is the place of its body: the origin of the first link. `moves`: the solver moves it.
     `is_kits`: a kit brings it.
     """
 
@@ -71,7 +70,7 @@ class _Piece:
 
 
 class _Overlap(NamedTuple):
-    """How deep something starts in something else (m), what that is, and how deep it would only touch it."""
+    """The depth of a body in another thing (m), the name of that, and the depth up to which both only touch."""
 
     depth: float
     what: str
@@ -79,7 +78,7 @@ class _Overlap(NamedTuple):
 
 
 def overlap_findings(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield the bodies that start in something, each once: the first thing of the file, and how deep they are in it.
+    """Yield the bodies that start in a thing, each once: the first thing of the file, and their depth in it.
 
     Of two bodies it is the later one of the file that starts in the other. Meshes count once their files are there.
     """
@@ -87,7 +86,7 @@ def overlap_findings(spec: WorldSpec) -> Iterator[Finding]:
     if not layout.couples:
         return
     order = {name: number for number, name in enumerate((*spec.robots, *spec.objects))}
-    entities = sorted(layout.entities, key=lambda entity: order.get(entity.name, -1))  # what a kit brings comes first
+    entities = sorted(layout.entities, key=lambda entity: order.get(entity.name, -1))  # entities of a kit come first
     pieces = _Pieces([*_scenery(spec), *_bodies(spec, layout, entities, initial_numbers(spec, layout))])
     found = 0
     for owner, entity in enumerate(entities):
@@ -100,9 +99,9 @@ def overlap_findings(spec: WorldSpec) -> Iterator[Finding]:
 
 
 def overlapped(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
-    """Return what an entity is in where the numbers of a frame put it, and how deep; empty if it is in nothing.
+    """Return the thing that an entity overlaps at its place in a frame, and the depth; empty without an overlap.
 
-    What a kit brings is compared as well: it comes where its kit has not placed it.
+    Entities of a kit are compared as well, since they come to other places than their kit's.
     """
     others = [one for one in layout.entities if one is not entity]
     bodies = [replace(piece, is_kits=False) for piece in _bodies(spec, layout, [*others, entity], numbers)]
@@ -113,7 +112,7 @@ def overlapped(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity
 
 def _finding(spec: WorldSpec, entity: Entity, overlap: _Overlap, place: Vector) -> Finding:
     section, settings = "robots" if entity.is_robot else "objects", spec.settings_of(entity.name)
-    assert settings is not None, "what a kit brings is the first"
+    assert settings is not None, "entities of a kit are the first"
     key = next((key for key in PLACED_BY if key in type(settings).model_fields), "model")
     what, depth, touching = overlap.what, f"{overlap.depth * 1e3:.3g} mm", f"{overlap.touching * 1e3:.3g} mm"
     x, y, z = place
@@ -139,20 +138,20 @@ class _Pieces:
         return first, last
 
     def place_of(self, owner: int) -> Vector:
-        """Return where an owner that has pieces is (m)."""
+        """Return the place of an owner with pieces (m)."""
         return self._all[self._range(owner)[0]].body_at
 
     def first_overlap(self, owner: int) -> _Overlap | None:
         """Return the deepest overlap of an owner's pieces with the first of the earlier owners that they are in."""
         first, last = self._range(owner)
-        asked, found = self._boxes.met(self._low[:, first:last], self._high[:, first:last])
-        asked = asked + first
-        is_met = (found < first) & (self._moves[asked] | self._moves[found])
-        is_met &= ~(self._is_kits[asked] & self._is_others[found])
-        asked, found = asked[is_met], found[is_met]
+        queries, found = self._boxes.met(self._low[:, first:last], self._high[:, first:last])
+        queries = queries + first
+        is_met = (found < first) & (self._moves[queries] | self._moves[found])
+        is_met &= ~(self._is_kits[queries] & self._is_others[found])
+        queries, found = queries[is_met], found[is_met]
         for whose in np.unique(self._owners[found]).tolist():
             chosen = self._owners[found] == whose
-            pairs = zip(asked[chosen].tolist(), found[chosen].tolist(), strict=True)
+            pairs = zip(queries[chosen].tolist(), found[chosen].tolist(), strict=True)
             deepest = _deepest((self._all[mine], self._all[its]) for mine, its in pairs)
             if deepest is not None:
                 return deepest
@@ -175,7 +174,7 @@ def _deepest(pairs: Iterable[tuple[_Piece, _Piece]]) -> _Overlap | None:
 
 
 def _scenery(spec: WorldSpec) -> Iterator[_Piece]:
-    """Yield the scenery that rigid bodies feel."""
+    """Yield the scenery with contacts."""
     sides = physics_of(spec).sides
     for shape in scenery_of(spec):
         if shape.surface in sides:
@@ -185,7 +184,7 @@ def _scenery(spec: WorldSpec) -> Iterator[_Piece]:
 
 
 def _bodies(spec: WorldSpec, layout: Layout, entities: Sequence[Entity], numbers: Sequence[float]) -> Iterator[_Piece]:
-    """Yield the shapes of all bodies that rigid bodies feel, in a frame. Owners are places in the list."""
+    """Yield the shapes of all bodies with contacts, in a frame. Owners are places in the list."""
     physics, models = physics_of(spec), models_of(spec, layout)
     for owner, entity in enumerate(entities):
         body: Body | None = models[entity.index].body() if entity.index in models else None

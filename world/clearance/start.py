@@ -1,6 +1,6 @@
 """Checks that robots which move by kinematics start outside of scenery, and of one another.
 
-A kit checks those of its own models. That takes geometry, so it is looked at when all single fields are right.
+A kit checks those of its own models. This takes geometry, so it is done when all single fields are valid.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from foosim.world.moving.upright import Upright, made_model, stands_upright, upr
 from foosim.world.spec import WorldSpec
 
 PLACED_BY = ("at", "path")
-"""Settings that say where a robot starts."""
+"""Settings with the start of a robot."""
 
 
 def start_findings(spec: WorldSpec) -> Iterator[Finding]:
@@ -33,11 +33,11 @@ def start_findings(spec: WorldSpec) -> Iterator[Finding]:
     found: dict[int, str] = {}
     shapes = list(scenery_of(spec))
     standing = Standing([solid(shape) for shape in shapes], float(np.max(radius)))
-    who, what = standing.near(places[:, 0], places[:, 1])
+    rows, what = standing.near(places[:, 0], places[:, 1])
     solids = standing.solids.at(what)
-    depth = distance(*solids.beside(places[who, 0], places[who, 1]))
-    is_in = (depth < radius[who] + solids.radius) & (solids.low < top[who]) & (solids.high > bottom[who])
-    for row, number in zip(who[is_in].tolist(), what[is_in].tolist(), strict=True):
+    depth = distance(*solids.beside(places[rows, 0], places[rows, 1]))
+    is_in = (depth < radius[rows] + solids.radius) & (solids.low < top[rows]) & (solids.high > bottom[rows])
+    for row, number in zip(rows[is_in].tolist(), what[is_in].tolist(), strict=True):
         found.setdefault(row, f"the {shapes[number].name or 'scenery'}")
     one, other = pairs_near(places, places, 2.0 * float(np.max(radius)))
     dx, dy = places[other, 0] - places[one, 0], places[other, 1] - places[one, 1]
@@ -53,7 +53,7 @@ def start_findings(spec: WorldSpec) -> Iterator[Finding]:
 
 
 def _placed(spec: WorldSpec, layout: Layout, entity: Entity) -> tuple[tuple[float, float, float], Upright]:
-    """Return where an entity starts (m), and its cylinder."""
+    """Return the start of an entity (m), and its cylinder."""
     model, numbers = made_model(spec, layout, entity), [0.0] * layout.size
     model.place(WritableView(0, numbers))
     at = entity.offsets["position"]

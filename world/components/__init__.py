@@ -1,1 +1,1 @@
-"""Components in the frames of a layout: what they see, how they are made, and how they are sampled."""
+"""Components in the frames of a layout: their base classes, views, building and sampling."""

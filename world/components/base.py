@@ -1,8 +1,8 @@
 """The base classes of components: what foosim calls of each, as hooks that are empty by default.
 
 A component derives from the class of its type, is registered by the decorator of that name (`world/forms/registry.py`)
-and overrides what it needs. It is made from its settings and its mounting, and is a pure function of the frame, its
-settings and keyed draws: what it remembers is slots, and its object keeps only what follows from deployment and layout.
+and overrides what it needs. It gets its settings and its mounting, and is a pure function of the frame, its settings
+and keyed draws: its state is in slots, and its object keeps only what follows from deployment and layout.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Component:
     def check(settings: Any, at: Any) -> None:
         """Raise IncompatibleComponent where the settings do not fit the robot or the world; `at` is the mounting.
 
-        A modifier gets the numbers that it is on in place of a mounting (`forms.per_field.Numbers`), and raises
+        A modifier gets its numbers in place of a mounting (`forms.per_field.Numbers`), and raises
         BadValue.
         """
 
@@ -54,7 +54,7 @@ class Sensor(Component):
     array (rays, 6), in m in the world frame."""
 
     def sample(self, view: WritableView) -> Any:
-        """Return what is measured: a value of the registered reading."""
+        """Return the measurement: a value of the registered reading."""
         return None
 
     def limits(self) -> Limits:
@@ -67,10 +67,10 @@ class Actuator(Component):
 
     type_name = "actuator"
     steady: ClassVar[bool] = False
-    """Whether `command` follows from the state of the robot and the slots alone, whatever the tick is: a rod that its
-    actuators have left as it was stays so, unsolved."""
+    """Whether `command` is a function of the robot's state and the slots, whatever the tick: a rod at rest that its
+    actuators leave unchanged is not solved."""
     FAILURES: ClassVar[Mapping[float, str]] = {}
-    """What the numbers in the slot `failure` mean, for whoever gave a job."""
+    """The meaning of each number in the slot `failure`, for the sender of a job."""
     together: ClassVar[Any] = None
     """A static method of a list of actuators of the class, of robots that move by kinematics: it returns an object
     whose `command(view)` returns an array (actuators, motors, 2), with the same bits."""
@@ -99,7 +99,7 @@ class Actuator(Component):
         return command
 
     def names(self) -> Sequence[str]:
-        """Return what the numbers of a command are called in messages; nothing: as their fields."""
+        """Return the names of a command's numbers in messages; empty: those of its fields."""
         return ()
 
     def problem(self, command: Any) -> str:
@@ -107,17 +107,17 @@ class Actuator(Component):
         return ""
 
     def hold(self, view: WritableView) -> None:
-        """Ask for the present state from now on: the robot goes out of service, or comes back, or its job ended."""
+        """Hold the present state from now on: the robot goes out of service, or comes back, or its job ended."""
 
     def excite(self, view: WritableView) -> None:
-        """Ask for some motion, for the fixed small run that tells engines apart."""
+        """Command some motion, for the fixed small run that distinguishes engines."""
 
     def wrench(self, view: View) -> tuple[Vector, Vector] | None:
         """Return a force (N) at the centre of mass of a free rigid base and a torque (N m), in its principal axes."""
         return None
 
     def unpowered(self) -> Motors | None:
-        """Return what is asked of the motors of a robot without power; None: a speed of 0 with the usual force."""
+        """Return the set-points of the motors of a robot without power; None: a speed of 0 with the usual force."""
         return None
 
     def progress(self, view: WritableView) -> JobState:
@@ -151,14 +151,14 @@ class Model(Component):
 
     type_name = "model"
     is_upright: bool = True
-    """Whether one that moves by kinematics is a cylinder to obstacles (`upright`), and not what its shapes are."""
+    """Whether obstacles meet an entity that moves by kinematics as a cylinder (`upright`) instead of its shapes."""
 
     def body(self) -> Body | None:
-        """Return its links and shapes; None of what has none."""
+        """Return its links and shapes; None without a body."""
         return None
 
     def place(self, view: WritableView) -> None:
-        """Set its fields to what they are at tick 0. All are 0 before, and references -1."""
+        """Set its fields for tick 0. All are 0 before, and references -1."""
 
     def check_place(self, position: Vector) -> None:
         """Raise BadValue where it cannot be put in a running world (m, world frame)."""
@@ -167,21 +167,21 @@ class Model(Component):
         """Put it somewhere (m, m/s, world frame): overridden by models whose settings have no place."""
 
     def derive(self, view: WritableView) -> None:
-        """Write the fields of a rigid model that follow from what the engine has computed, which is finite."""
+        """Write the fields of a rigid model that follow from the engine's result, which is finite."""
 
     def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether its new, finite state can be: where it may be, within its speed limit and its reach."""
+        """Whether its new, finite state is valid: inside its area, within its speed limit and its reach."""
         return True
 
     def out_of_bounds(self, numbers: Sequence[float]) -> str:
-        """Return what is wrong with a state that no run should come to; empty if nothing is."""
+        """Return the problem of a state that no run should reach; empty without one."""
         return ""
 
     def excite(self, view: WritableView) -> None:
-        """Set it in motion, for the fixed small run that tells engines apart."""
+        """Set it in motion, for the fixed small run that distinguishes engines."""
 
     def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
-        """Return the numbers of its slots for a new value of something settable."""
+        """Return the numbers of its slots for a new value of a settable field."""
         return {field: (value,)}
 
     def upright(self) -> Any:
@@ -189,70 +189,70 @@ class Model(Component):
         return None
 
     def wheels(self) -> Any:
-        """Return its two driven wheels (`moving.wheels.Wheels`); None of what has none."""
+        """Return its two driven wheels (`moving.wheels.Wheels`); None without these."""
         return None
 
 
 class Motion:
     """How the entities of a model without rigid-body dynamics move: one object moves all of a layout.
 
-    It is made from a `MotionMounting`, and may write all fields of these entities.
+    It gets a `MotionMounting`, and may write all fields of these entities.
     """
 
     slots: ClassVar[Mapping[str, int]] = {}
-    """What it remembers of each entity, as `motion.FIELD`."""
+    """Its slots of each entity, as `motion.FIELD`."""
     takes_arrays: ClassVar[bool] = False
     """Whether `motors` may be an array of shape (entities, motors, 2)."""
 
     def move(self, entities: Sequence[Entity], motors: Any, view: Any) -> None:
-        """Write the state after a tick of these entities, whose motors are asked for this much.
+        """Write the state of these entities after a tick with these set-points of their motors.
 
-        `view.numbers` are those at the start of the tick, of all entities, before commands reached them. What is
-        written is read at the next tick, so that the order in which entities are moved changes nothing.
+        `view.numbers` are those of all entities at the start of the tick, before commands reached them. Written
+        numbers are read at the next tick, so that the order in which entities are moved changes nothing.
         """
 
 
 class _Marking(Component):
     mark_kinds: ClassVar[Mapping[str, MarkKind]] = {}
-    """What its marks look like, by kind."""
+    """The look of its marks, by kind."""
 
     def apply(self, view: WritableView) -> None:
-        """Write what the rule does in this tick."""
+        """Write the effect of the rule in this tick."""
 
     def place(self, view: WritableView) -> None:
-        """Write what it has at tick 0."""
+        """Write its slots at tick 0."""
 
     def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
-        """Return the numbers of its slots for a new value of something settable."""
+        """Return the numbers of its slots for a new value of a settable field."""
         return {field: (value,)}
 
     def marks(self, before: Frame, after: Frame) -> Iterable[Marked]:
-        """Yield what it did between two frames, which may be several ticks apart."""
+        """Yield its marks between two frames, which may be several ticks apart."""
         return ()
 
 
 class Rule(_Marking):
     """A rule of the world: `apply` edits the frame before the tick is solved, on every node alike.
 
-    It is made from its settings and a `RuleMounting`.
+    It gets its settings and a `RuleMounting`.
     """
 
     type_name = "rule"
 
     def status(self, view: View) -> Mapping[str, Any]:
-        """Return what is shown of it, for JSON."""
+        """Return its state for displays, as JSON."""
         return {}
 
     @staticmethod
     def text(status: Any) -> str:
-        """Return the status in words; it has that of all rules and kits."""
+        """Return its part of the status in words; `status` has that of all rules and kits."""
         return ""
 
 
 class EntityRule(_Marking):
     """A rule of one entity: `apply` runs after the entity was solved; others are seen as at the start of the tick.
 
-    Marks are asked about frames that both have the entity.
+    `marks` is called with frames that both have the entity.
     """
 
     type_name = "entity_rule"
@@ -268,11 +268,11 @@ class Kit:
     type_name: ClassVar[str] = "kit"
 
     def __init__(self, section: Any, spec: Any) -> None:
-        """It is made from the section and the deployment's world."""
+        """The section of the deployment, and its world."""
 
     @staticmethod
     def check(section: Any, spec: Any) -> Iterable[Finding]:
-        """Yield what is wrong between settings, before any kit or robot is made."""
+        """Yield problems between settings, before any kit or robot is built."""
         return ()
 
     def shapes(self) -> tuple[Shape, ...]:
@@ -280,7 +280,7 @@ class Kit:
         return ()
 
     def physics(self) -> Physics | None:
-        """Return what rigid bodies feel; None of a kit without any."""
+        """Return its surfaces and bodies for rigid bodies; None without any."""
         return None
 
     def reach(self, layout: Layout) -> Reach | None:
@@ -288,18 +288,18 @@ class Kit:
         return None
 
     def findings(self) -> Iterable[Finding]:
-        """Yield what is wrong with places: what needs all single settings to be right."""
+        """Yield problems of places, which need all single settings to be valid."""
         return ()
 
     def strays(self, frame: Frame) -> list[str]:
-        """Return descriptions of entities that are where no run should bring them."""
+        """Return descriptions of entities at places that no run should reach."""
         return []
 
     def status(self, frame: Frame) -> Mapping[str, Any]:
-        """Return what is shown of it, for JSON."""
+        """Return its state for displays, as JSON."""
         return {}
 
     @staticmethod
     def text(status: Any) -> str:
-        """Return the status in words; it has that of all rules and kits."""
+        """Return its part of the status in words; `status` has that of all rules and kits."""
         return ""

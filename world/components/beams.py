@@ -44,9 +44,9 @@ class BeamsTogether(Rows):
         self._passed = np.array([one.entity.index for one in several], np.int64)
 
     def distances(self, view: View) -> Floats:
-        """Return how far it is from each mount to what its beams meet at the start of a tick (m): (sensors, beams).
+        """Return the distances from mounts to the first hits of their beams at a tick's start (m): (sensors, beams).
 
-        It is inf where that is nothing within a sensor's range.
+        It is inf where nothing is within a sensor's range.
         """
         values = view.values if isinstance(view, SensingView) else None
         placement = self._around.placement(view)
@@ -70,7 +70,7 @@ class BeamsTogether(Rows):
 
 
 def body_of(at: Mounting) -> Body:
-    """Return the body of the robot that a component is on. Raises BadValue for one that has none."""
+    """Return the body of the robot that a component is on. Raises BadValue without one."""
     made = at.robot.kind.factory(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
     body: Body | None = made.body()
     if body is None:

@@ -58,7 +58,7 @@ class CommandBounds:
     """The limits of one actuator. What it keeps follows from the actuator."""
 
     def __init__(self, made: Any, codec: PayloadCodec) -> None:
-        """Raises ContractError for limits that are none."""
+        """Raises ContractError for invalid limits."""
         self._made, self._codec, self._limits = made, codec, limits_of(made, codec.fields)
         self._within: Callable[[Any], Any] | None = made.within if overrides(type(made), "within") else None
         self._size = -1
@@ -68,7 +68,7 @@ class CommandBounds:
     def clamp(self, command: Any) -> tuple[Any, Sequence[Clamped]] | None:
         """Return a command within the limits, and which numbers were not.
 
-        None of a command with too many numbers, too few, or one that is not finite, which modifiers may make.
+        None of a command with too many numbers, too few, or a non-finite one, which modifiers may return.
         """
         if not self._codec.is_packed:
             return self._clamp_fields(command)
@@ -114,7 +114,7 @@ class CommandBounds:
         ]
 
     def _clamp_fields(self, command: Any) -> tuple[Any, Sequence[Clamped]]:
-        """Clamp the fields with limits of a command that is not all numbers; what is no number there stays."""
+        """Clamp the fields with limits of a command with other fields than numbers; these stay."""
         units = {field.name: field.unit for field in self._codec.fields}
         within: dict[str, Any] = {}
         beyond: list[Clamped] = []

@@ -1,7 +1,7 @@
 """Warns of commands that robots clamp or refuse: the first time for each robot, channel and number.
 
-How many there are the frames say. Which they were follows from the deliveries of the tick, so whichever node computed
-it, and however many there are, the warning comes once.
+Their count is in the frames, and the commands are in the deliveries of the tick. So the warning comes once, with any
+number of nodes and any owner.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ UNSEEN: Final[Mapping[str, str]] = {
     "clamped": "a command is clamped as its modifiers leave it",
     "refused": "a packet is refused: the robot is out of service, or neither outbox nor actuator takes it",
 }
-"""What is known of a command whose packet does not show it."""
+"""The text for a command that its packet does not show."""
 
 
 class CommandWatch:
@@ -47,7 +47,7 @@ class CommandWatch:
     def committed(self, before: Frame, after: Frame, delivered: Callable[[], Sequence[Delivered]]) -> None:
         """Warn of what happened to commands in the tick between two frames; `delivered` returns what came in it."""
         layout = after.layout
-        if layout is not before.layout:  # who joins or leaves has its counters anew
+        if layout is not before.layout:  # an entity that joins or leaves has new counters
             return
         if layout is not self._layout:
             self._layout, self._actuators, self._due = layout, {}, {}

@@ -1,4 +1,4 @@
-"""What models, motions and rules of the world are made from, and what they return."""
+"""Mountings of models, motions and rules of the world, and the values that these return."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from foosim.world.spec import WorldSpec
 S = TypeVar("S")
 
 Motors = tuple[tuple[float, ...], ...]
-"""What actuators ask of each motor of an entity: target speed, and greatest force or acceleration (SI units).
+"""The set-point of each motor of an entity: target speed, and greatest force or acceleration (SI units).
 
 Of a rigid body a third number may follow, `drives.Motor.slope`."""
 Marked: TypeAlias = tuple[int, str, str]
-"""What happened: the tick, the kind of the mark, the text."""
+"""An event: the tick, the kind of the mark, the text."""
 
 
 @dataclass(frozen=True, slots=True)
 class MarkKind:
-    """How marks of a kind look on a time line, and what several of them are called.
+    """The look of marks of a kind on a time line, and their name in the plural.
 
-    `is_cut` says that something is put elsewhere then: no way leads there.
+    `is_cut`: an entity is put elsewhere then, without a path between both places.
     """
 
     look: Literal["score", "start", "away", "rest", "lost"]
@@ -33,13 +33,13 @@ class MarkKind:
 
 
 def mounting_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Mounting:
-    """Return what the model of an entity is made with."""
+    """Return the mounting of an entity's model."""
     return Mounting(spec, layout, entity, "", draw_key(spec.seed, "model", entity.name), frozenset(entity.fields))
 
 
 @dataclass(frozen=True, slots=True)
 class MotionMounting:
-    """What a motion moves: the entities of a layout whose models have it."""
+    """The mounting of a motion: the entities of a layout whose models have it."""
 
     spec: WorldSpec
     layout: Layout
@@ -47,7 +47,7 @@ class MotionMounting:
     entities: tuple[Entity, ...]
 
     def settings(self, kind: type[S]) -> dict[int, S]:
-        """Return the settings of what is moved, which are of this class, by index."""
+        """Return the settings of the moved entities, which are of this class, by index."""
         found: dict[int, S] = {}
         for entity in self.entities:
             settings = self.spec.settings_of(entity.name)
@@ -66,7 +66,7 @@ class MotionMounting:
 
 @dataclass(frozen=True, slots=True)
 class RuleMounting:
-    """Where a rule of the world is: in which world, under which name, and the key of its draws.
+    """The mounting of a rule: its world, its name, and the key of its draws.
 
     `writes` are the models whose state it may change.
     """
@@ -78,11 +78,11 @@ class RuleMounting:
     writes: frozenset[str]
 
     def slot(self, field: str) -> Slot:
-        """Return what the rule itself remembers of the world."""
+        """Return the rule's own slot of the world."""
         return self._slot(self.layout[WORLD], f"{self.name}.{field}", is_own=True)
 
     def of(self, entity: Entity, field: str) -> Slot:
-        """Return what the rule remembers of an entity, else a field of the entity."""
+        """Return the rule's own slot of an entity, else a field of the entity."""
         own = f"{self.name}.{field}"
         if own in entity.offsets:
             return self._slot(entity, own, is_own=True)

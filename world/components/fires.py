@@ -1,4 +1,4 @@
-"""The fires of a world, as forms see them: where each is that burns, and how great it is."""
+"""The fires of a world, as forms see them: the place and the radius of each burning one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from foosim.world.layout import Layout
 from foosim.world.spec import WorldSpec
 
 FIRE: Final = "fire"
-"""The tag of fires. One of another package has it, too, and the fields `position` and `radius`."""
+"""The tag of fires. A fire of another package needs it, too, and the fields `position` and `radius`."""
 
 
 class Fires:
@@ -26,7 +26,7 @@ class Fires:
     def near(self, place: Sequence[float], start: Sequence[float]) -> Iterator[tuple[float, float]]:
         """Yield of each fire that burns its radius (m) and the square of its distance from a place (m2), in name order.
 
-        `start` are the numbers at the start of the tick. What is out, or absent, has a radius of 0.
+        `start` are the numbers at the start of the tick. A fire that is out, or absent, has a radius of 0.
         """
         x, y, z = place
         for at, radius_at in self._fires:

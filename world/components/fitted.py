@@ -1,4 +1,4 @@
-"""The components of the robots of one layout, made from their settings: what senses, and what takes commands."""
+"""The sensors and actuators of the robots of one layout, built from their settings."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class BoundModifier:
     """Whether commands may have to wait in it."""
 
     def apply(self, values: list[float], view: WritableView) -> list[float] | None:
-        """Return what becomes of the numbers of a reading. Raises ComponentError."""
+        """Return the numbers of a reading after the modifier. Raises ComponentError."""
         return self._checked(len(values), view, self.modifier.apply, values, view)
 
     def accept(self, values: list[float], view: WritableView) -> list[float] | None:
-        """Return what becomes of the numbers of a command; None where it is dropped or waits. Raises ComponentError."""
+        """Return a command's numbers after the modifier; None where it is dropped or waits. Raises ComponentError."""
         return self._checked(len(values), view, self.modifier.accept, values, view)
 
     def take_due(self, size: int, view: WritableView) -> list[float] | None:
-        """Return the numbers of a command whose time has come, of so many. Raises ComponentError."""
+        """Return the `size` numbers of a command that is due, None without one. Raises ComponentError."""
         return self._checked(size, view, self.modifier.due, view) if self.waits else None
 
     def _checked(
@@ -87,7 +87,7 @@ class BoundSensor:
     codec: PayloadCodec
     modifiers: tuple[BoundModifier, ...]
     size: int
-    """How many numbers a reading has; 0 of one that is not all numbers."""
+    """The count of a reading's numbers; 0 of one with other fields than numbers."""
     trigger_at: int = -1
     """The place of the number that makes it measure where it is not 0; -1 without one."""
 
@@ -98,7 +98,7 @@ class BoundSensor:
         )
 
     def sample(self, view: WritableView) -> Any:
-        """Return what is measured. Raises ComponentError."""
+        """Return the measurement. Raises ComponentError."""
         try:
             reading = self.sensor.sample(view)
         except BaseException as error:
@@ -123,7 +123,7 @@ class BoundActuator:
     codec: PayloadCodec
     modifiers: tuple[BoundModifier, ...]
     size: int
-    """How many numbers a command has; 0 of one that is not all numbers."""
+    """The count of a command's numbers; 0 of one with other fields than numbers."""
     bounds: CommandBounds
     clamped_at: int
     """The place of the robot's count of clamped commands."""
@@ -132,7 +132,7 @@ class BoundActuator:
     joints: tuple[int, ...] | None = None
     """The numbers of the joints whose motors it commands; None for all of them."""
     jobs: JobBook | None = None
-    """What it remembers of its jobs; None of one whose commands are none."""
+    """The state of its jobs; None of an actuator without jobs."""
 
     @property
     def has_waiting(self) -> bool:
@@ -152,14 +152,14 @@ class BoundActuator:
         view.count_command(self)
         if not self.modifiers:
             return self._take(command, view)
-        return self._go_on(0, self.codec.numbers(command), view)
+        return self._take_from(0, self.codec.numbers(command), view)
 
     def take_due(self, view: WritableView) -> int:
         """Take the commands whose time has come; return how many of them are refused. Raises ComponentError."""
         refused = 0
         for place, one in enumerate(self.modifiers):
             values = one.take_due(self.size, view)
-            if values is not None and not self._go_on(place + 1, values, view):
+            if values is not None and not self._take_from(place + 1, values, view):
                 refused += 1
         return refused
 
@@ -180,8 +180,8 @@ class BoundActuator:
             raise self.failed(0, error) from error
         return (why, found[1]) if found is not None else (f"{self.codec.name} of another length", ())
 
-    def _go_on(self, place: int, values: list[float], view: WritableView) -> bool:
-        """Take a command that has come to this place among the modifiers; dropping or delaying one is no refusal."""
+    def _take_from(self, place: int, values: list[float], view: WritableView) -> bool:
+        """Take a command through the modifiers from this place on; dropping or delaying it is no refusal."""
         left: list[float] | None = values
         for one in self.modifiers[place:]:
             assert left is not None
@@ -227,7 +227,7 @@ class BoundActuator:
         return component_error(f"actuator {self.channel}", self.robot, tick, error)
 
 
-# --- making ----------------------------------------------------------------------------------------------------------
+# --- building --------------------------------------------------------------------------------------------------------
 
 
 def sensors_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[BoundSensor, ...]:
@@ -301,7 +301,7 @@ def _made(component: Component, settings: ComponentSettings, mounting: Mounting 
 
 
 class Spacing(NamedTuple):
-    """How far apart the values of a component are: the least number of ticks, and the mean time (s)."""
+    """The period of a component's values: the least number of ticks, and the mean time (s)."""
 
     least_ticks: int
     period_s: float

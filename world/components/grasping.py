@@ -1,4 +1,4 @@
-"""What a gripper may take: the free rigid objects of a layout, their sizes and masses, and how far away they are."""
+"""Objects for grippers: the free rigid objects of a layout, their sizes and masses, and their distances."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Reach = Annotated[float, Quantity(units.LENGTH, "1 mm", "2 m")]
 Opening = Annotated[float, Quantity(units.LENGTH, "1 mm", "10 m")]
 Load = Annotated[float, Quantity(units.MASS, "1 g", "100000 kg")]
 Grasp = tuple[Vector, Quaternion]
-"""The pose of what is held, its centre of mass in its principal axes, in the frame of the link that holds it."""
+"""The pose of the held entity, its centre of mass in its principal axes, in the frame of the link that holds it."""
 
 
 class GripperSettings(ActuatorSettings):

@@ -1,4 +1,4 @@
-"""What an actuator remembers of its jobs, and what each command does to that: see `forms.jobs`."""
+"""The state of an actuator's jobs, and the effect of each command on it: see `forms.jobs`."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.forms.failures import ContractError
 from foosim.world.forms.jobs import CHANGED, JOB, NUMBER_MAX, NUMBERS, RUNNING, STATES, JobState
 
-NOBODY: Final = 0.0
+NO_JOB: Final = 0.0
 FRESH: Final = 2.0
 """In `jobs_changed` until the tick's end: something has changed in this tick."""
 TOLD: Final = 1.0
-"""In `jobs_changed` of the frame behind it, in which sensors tell of it."""
+"""In `jobs_changed` of the next frame, in which sensors report the change."""
 
 
 class JobBook:
-    """The jobs of one actuator. All that it remembers is slots of that."""
+    """The jobs of one actuator. All state is in the actuator's slots."""
 
     def __init__(self, at: Mounting) -> None:
         self._rows = {name: row for row, name in enumerate(at.spec.senders_to(at.robot.name))}
@@ -29,7 +29,7 @@ class JobBook:
         self._running, self._changed = at.slot(RUNNING), at.slot(CHANGED)
 
     def addressed(self, command: Any, source: str) -> Any | None:
-        """Return a command whose number says whose it is, too, so that modifiers may keep it for a later tick.
+        """Return a command whose number includes the sender, so that modifiers may keep it for a later tick.
 
         None of a job of a sender that the deployment does not let command the robot, or whose number is none.
         """
@@ -44,8 +44,8 @@ class JobBook:
     def take(self, command: Any, view: WritableView, made: Actuator, carry_out: Callable[[Any], bool]) -> bool:
         """Take a command that `addressed` has returned: a plain one, a job or a cancellation; False: it is refused.
 
-        Each new one ends what runs. A job that the actuator refuses fails. A number that is not above the last one of
-        its sender is a repeat, and does nothing.
+        Each new one ends the job that runs. A job that the actuator refuses fails. A number up to the last one of its
+        sender is a repeat, and does nothing.
         """
         plain = msgspec.structs.replace(command, **{JOB: 0.0})
         if command.job == 0.0:
@@ -72,7 +72,7 @@ class JobBook:
         return False
 
     def _cancel(self, view: WritableView, row: int, number: float, made: Actuator) -> None:
-        """End the job of a sender; one that has not come yet never begins."""
+        """End the job of a sender; a job that arrives later never begins."""
         last = view.numbers[self._numbers.at + row]
         is_running = view.numbers[self._running.at] == row + 1.0
         if number < last or (number == last and not is_running):
@@ -88,7 +88,7 @@ class JobBook:
         Without power it fails. An actuator whose job has failed holds.
         """
         numbers = view.numbers
-        if numbers[self._running.at] != NOBODY:
+        if numbers[self._running.at] != NO_JOB:
             state = made.progress(view) if has_power else JobState.FAILED
             if state not in (JobState.RUNNING, JobState.DONE, JobState.FAILED):
                 raise ContractError(made.progress, "JobState.RUNNING, DONE or FAILED", state)
@@ -106,14 +106,14 @@ class JobBook:
 
     def is_idle(self, view: View) -> bool:
         """Whether `judge` has nothing to do."""
-        return view.numbers[self._running.at] == NOBODY and view.numbers[self._changed.at] == 0.0
+        return view.numbers[self._running.at] == NO_JOB and view.numbers[self._changed.at] == 0.0
 
     def _end(self, view: WritableView, state: JobState) -> bool:
         """Let the job that runs end so; return whether one ran."""
         running = int(view.numbers[self._running.at])
         if running:
             row = running - 1
-            view.write(self._running, NOBODY)
+            view.write(self._running, NO_JOB)
             self._note(view, row, view.numbers[self._numbers.at + row], state)
         return running > 0
 

@@ -19,9 +19,9 @@ from foosim.world.rays.shapes import multiplied, rotated
 from foosim.world.scene import Body, Quaternion, Vector, conjugate, moved, multiply, rotate
 
 STATE: Final = ("position", 3), ("orientation", 4)
-"""What of the state is where a free link is."""
+"""The fields with the pose of a free link."""
 OF_TWIST = ("linear_velocity", "angular_velocity")
-"""Fields of a free body without which nobody knows how its places move."""
+"""Fields of a free body with the motion of its places."""
 
 
 def joint_indices(at: Mounting, named: Sequence[str], setting: str = "joints") -> tuple[int, ...]:
@@ -55,7 +55,7 @@ class Mounted:
         fixed = [*conjugate(link.principal), *link.centre_of_mass, *self.position, *self.orientation]
         self.free: tuple[NDArray[np.intp], Floats] = np.array(places, np.intp), np.array(fixed)
         """Of a free link: the places of its position and orientation in the frame; its principal axes, conjugated, its
-        centre of mass, and the mount's position and orientation. Of any other it says nothing."""
+        centre of mass, and the mount's position and orientation. None of any other link."""
 
     def pose(self, numbers: Sequence[float]) -> tuple[Vector, Quaternion]:
         """Return the place (m) and the orientation of the mount, in the world frame, from the frame's numbers."""
@@ -68,7 +68,7 @@ class Mounted:
         return twist(self._body, self.entity, numbers, self.link, place)
 
     def check_twist(self) -> None:
-        """Raise IncompatibleComponent where the robot's state does not say how fast its places move and turn."""
+        """Raise IncompatibleComponent where the robot's state lacks the velocity of its places."""
         missing = [field for field in OF_TWIST if field not in self.entity.offsets]
         if self._body.is_free and missing:
             what = f"{self.entity.name} moves freely, and its state has no {', '.join(missing)}"

@@ -15,8 +15,8 @@ MARGIN_M = 0.001
 @dataclass(frozen=True)
 class Reach:
     """Bounding volumes. `ball_m` is the radius of a grown ball; `rods` are (index, name, x of the axis) in order of x,
-    with one half width and one band of z; `balls` are (index, start of the position); `alone` are the islands of what
-    touches nobody."""
+    with one half width and one band of z; `balls` are (index, start of the position); `alone` are the islands of
+    entities without contacts."""
 
     ball_m: float
     rods: tuple[tuple[int, str, float], ...]
@@ -28,7 +28,7 @@ class Reach:
     alone: tuple[Island, ...] = ()
 
     def without(self, absent: Collection[int]) -> Reach:
-        """Return those of all but some entities, by their indices."""
+        """Return the volumes of all but some entities, by their indices."""
         balls = tuple([ball for ball in self.balls if ball[0] not in absent])
         alone = tuple([one for one in self.alone if one.entities[0] not in absent])
         return replace(self, balls=balls, alone=alone)

@@ -1,20 +1,20 @@
-"""What several components of a class are together, of which some can be taken."""
+"""Several components of a class computed together, of which some rows can be taken."""
 
 from __future__ import annotations
 
 from copy import copy
 from typing import TYPE_CHECKING, Self
 
-if TYPE_CHECKING:  # only processes that compute ticks need numpy
+if TYPE_CHECKING:  # only processes that compute ticks import numpy
     import numpy as np
     from numpy.typing import NDArray
 
 
 class Rows:
-    """What several components became, whose arrays all have a row for each of them first."""
+    """Several components computed together, whose arrays all have a row for each of them first."""
 
     def taken(self, rows: NDArray[np.intp]) -> Self:
-        """Return those of some of them, by their rows."""
+        """Return that of some of the components, by their rows."""
         import numpy as np
 
         found = copy(self)

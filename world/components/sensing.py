@@ -1,6 +1,6 @@
 """The readings of many sensors in one frame: each by itself, or those of a class together, with the same bits.
 
-Sensors that are due at one tick are due together again, so what is put together is kept for each set of them.
+Sensors that are due at one tick are due together again, so their plan is kept for each set of them.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ MODIFIED_TOGETHER_MIN: Final = 64
 """Numbers from which on modifiers are computed together. Amid a tick little of numpy is in a cache of the processor:
 arrays of fewer numbers cost more than one number after the other."""
 METHODS: Final = {"sensor": "sample", "modifier": "apply"}
-"""What computes one of a form alone."""
+"""The method that computes one component alone."""
 NAMED_MAX: Final = 4
-"""Sensors that a message about several names."""
+"""Names of sensors in a message about several."""
 PLANS_MAX: Final = 64
 """Sets of sensors whose plan is kept: those of ticks, and of robots that are out of service."""
 
@@ -36,7 +36,7 @@ class Sensing:
     def __init__(self) -> None:
         self._plans: dict[tuple[BoundSensor, ...], Plan] = {}
         self._wholes: dict[tuple[BoundSensor, ...], Plan] = {}
-        """Those from which others are taken."""
+        """The plans from which plans of some rows are taken."""
 
     def sample(
         self,
@@ -47,8 +47,8 @@ class Sensing:
     ) -> list[bytes | None]:
         """Return the payload of each sensor in a frame, None of a reading that is dropped. Raises ComponentError.
 
-        Where they are some of a `whole` that is asked for again and again, by their `rows` in it, that is planned once.
-        `view.not_finite` has the sensors whose readings are dropped since a number in them is not finite.
+        Where they are the `rows` of a `whole` that is sampled again and again, the whole is planned once.
+        `view.not_finite` gets the sensors whose readings are dropped because of a non-finite number.
         """
         key = tuple(fitted)
         plan = self._plans.get(key)
@@ -71,9 +71,9 @@ def _keep(plans: dict[tuple[BoundSensor, ...], Plan], key: tuple[BoundSensor, ..
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Sensors or modifiers of one class that are computed together: the places of their sensors, themselves, what they
-    became, how many numbers each has, their form and names, for messages, and whether what they compute is what is
-    sent."""
+    """Sensors or modifiers of one class that are computed together: the places of their sensors, themselves, their
+    `together` object, the count of numbers of each, their form and names, for messages, and whether their numbers are
+    sent as they are."""
 
     places: list[int]
     members: list[Any]
@@ -105,7 +105,7 @@ def _names(form: str, fitted: Sequence[BoundSensor], places: Sequence[int]) -> s
 
 
 class Plan:
-    """What is done for one set of sensors, in which order. Raises ComponentError."""
+    """The steps of sampling one set of sensors, in order. Raises ComponentError."""
 
     def __init__(
         self, fitted: tuple[BoundSensor, ...], tick: int, known: tuple[_Divided, list[_Divided]] | None = None
@@ -134,7 +134,7 @@ class Plan:
 
     @property
     def groups(self) -> list[_Group]:
-        """Those that are computed together."""
+        """The groups that are computed together."""
         return [*self._together, *(group for groups, _ in self._steps for group in groups)]
 
     def _step(self, depth: int, tick: int) -> _Divided:
@@ -146,8 +146,7 @@ class Plan:
     def _divided(self, members: Sequence[tuple[int, Any, int]], form: str, least: int, tick: int) -> _Divided:
         """Divide (place, object, numbers) into groups of a class and a length, and the places of those without one.
 
-        One that would be a group of its own, and those that have less than `least` numbers together, are computed
-        alone, with the same bits.
+        A group of one, and a group of less than `least` numbers, is computed one after the other, with the same bits.
         """
         kinds: dict[tuple[type[Any], int], list[tuple[int, Any]]] = {}
         for place, one, size in members:
@@ -200,7 +199,7 @@ def _listed(reading: Any) -> list[float]:
 
 
 def _apply_together(group: _Group, readings: list[Any], view: SensingView) -> None:
-    """Let the modifiers of a group work on their readings; those that were dropped before stay so."""
+    """Let the modifiers of a group work on their readings; dropped readings stay dropped."""
     there = [place for place in group.places if readings[place] is not None]
     nothing = [0.0] * len(readings[there[0]]) if there else []
     if there:
@@ -236,7 +235,7 @@ def _numbers(one: BoundSensor, reading: Any, view: SensingView) -> list[float]:
 
 
 def _payload(one: BoundSensor, reading: Any, view: SensingView) -> bytes | None:
-    """Return the bytes of a reading; None of one that was dropped, or has a number that is not finite."""
+    """Return the bytes of a reading; None of one that was dropped, or has a non-finite number."""
     if reading is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""What forms see of the entities around them: poses of links, who is near, rays, tags, contacts.
+"""The surroundings of forms: poses of links, near entities, rays, tags, contacts.
 
 All of it follows from the frame; entities are in name order.
 """
@@ -28,9 +28,9 @@ class Contacts(NamedTuple):
 
 
 class Surroundings:
-    """The entities of one layout, as forms see them: a form makes one of what its mounting has.
+    """The entities of one layout, as forms see them: a form builds it from its mounting.
 
-    Where they are is of the start of the tick, the same in all nodes. What it keeps follows from deployment and layout.
+    Places are those at the start of the tick, the same in all nodes. It keeps only data of deployment and layout.
     """
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
@@ -38,12 +38,12 @@ class Surroundings:
         self._bodies: dict[str, Body | None] = {}
 
     def tags(self, entity: Entity) -> frozenset[str]:
-        """Return the tags of an entity: those of its model, and those that its settings add."""
+        """Return the tags of an entity: those of its model and of its settings."""
         settings = self._spec.settings_of(entity.name)
         return frozenset((*entity.kind.tags, *(() if settings is None else settings.tags)))
 
     def tagged(self, tag: str) -> list[Entity]:
-        """Return the entities that have a tag, with those that are absent: these are far from all places."""
+        """Return the entities with a tag, absent ones included: these are far from all places."""
         return [entity for entity in self._layout.entities if tag in self.tags(entity)]
 
     def poses(self, view: View, entity: Entity) -> list[Pose]:
@@ -52,12 +52,12 @@ class Surroundings:
         return [] if body is None else forward_kinematics(body, entity, view.start)
 
     def position(self, view: View, entity: Entity) -> Vector | None:
-        """Return where the first link of an entity is (m, world frame); None of what has none."""
+        """Return the place of the first link of an entity (m, world frame); None without links."""
         poses = self.poses(view, entity)
         return poses[0][1] if poses else None
 
     def near(self, view: View, place: Vector, range_m: float, tag: str = "") -> list[Entity]:
-        """Return the entities whose first link is within a range of a place; with a tag, those that have it."""
+        """Return the entities whose first link is within a range of a place; with a tag, only entities with that."""
         found = []
         for entity in self._layout.entities if not tag else self.tagged(tag):
             position = self.position(view, entity)
@@ -70,11 +70,11 @@ class Surroundings:
     def rays(
         self, view: View, origins: Floats, directions: Floats, range_m: Floats | float, ignoring: Entity | None = None
     ) -> Hits:
-        """Return what rays meet first (`Placement.cast`) of the scenery and of bodies, the entity `ignoring` aside."""
+        """Return the first hits of rays (`Placement.cast`) on scenery and bodies, the entity `ignoring` aside."""
         return self.placement(view).cast(origins, directions, range_m, None if ignoring is None else ignoring.index)
 
     def clearance(self, view: View, points: Floats, reach_m: Floats | float, ignoring: Entity | None = None) -> Floats:
-        """Return how far points are from the nearest surface (`Placement.clearance`), the entity `ignoring` aside."""
+        """Return distances from points to the nearest surface (`Placement.clearance`), the entity `ignoring` aside."""
         return self.placement(view).clearance(points, reach_m, None if ignoring is None else ignoring.index)
 
     def placement(self, view: View) -> Placement:
@@ -94,7 +94,7 @@ class Surroundings:
 
     @staticmethod
     def contacts(view: View, entity: Entity) -> Contacts:
-        """Return the contact log of a rigid body; nothing of what is none."""
+        """Return the contact log of a rigid body; empty for other entities."""
         at = entity.offsets.get("contacts")
         if at is None:
             return Contacts(0, 0.0, -1)

@@ -1,8 +1,7 @@
-"""What sensors and actuators have in common: what they see of the world, and where they are mounted.
+"""Common parts of sensors and actuators: their view of the world, and their mounting.
 
-A component is a pure function of the frame, its settings and keyed draws. Whatever it remembers is numbers of the
-frame, which it declares when it registers itself (`registry`); an object keeps only what follows from the deployment
-and the layout.
+A component is a pure function of the frame, its settings and keyed draws. All its state is numbers of the frame, which
+it declares when it registers itself (`registry`); an object keeps only data of deployment and layout.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from foosim.world.forms.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.spec import WorldSpec
 
-if TYPE_CHECKING:  # only processes that compute ticks need numpy
+if TYPE_CHECKING:  # only processes that compute ticks import numpy
     import numpy as np
     from numpy.typing import NDArray
 
@@ -28,9 +27,9 @@ Result = TypeVar("Result")
 
 
 class ComponentError(Failed):
-    """A form has raised, or returned what it must not: whichever node computes its tick, it would do so again.
+    """A form has raised, or returned an invalid value: each node that computes its tick would fail as it did.
 
-    `component` is which one of `entity` it is, `cause` has its traceback.
+    `component` is its name on `entity`, `cause` has its traceback.
     """
 
     def __init__(self, component: str, entity: str, tick: int, cause: BaseException) -> None:
@@ -39,7 +38,7 @@ class ComponentError(Failed):
 
 
 class IncompatibleComponent(BadValue):
-    """A setting of a component that its robot or its world does not fit; `path` leads to it from the component's."""
+    """A setting of a component that does not fit its robot or its world; `path` leads to it from the component's."""
 
     def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
         super().__init__(what, value, nearest)
@@ -47,12 +46,12 @@ class IncompatibleComponent(BadValue):
 
 
 def called_of(component: str, entity: str) -> str:
-    """Return in words which component of which entity it is; `entity` is empty, or that of the world, of others."""
+    """Return the component and its entity in words; `entity` is empty, or that of the world, for other forms."""
     return component + {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
 
 
 def component_error(component: str, entity: str, tick: int, error: BaseException) -> ComponentError:
-    """Return what a call of a form has come to, whatever it raised: SystemExit, too.
+    """Return the ComponentError of a call of a form, for each exception: SystemExit, too.
 
     An interrupt, and an error that names its form already, is raised as it is.
     """
@@ -62,7 +61,7 @@ def component_error(component: str, entity: str, tick: int, error: BaseException
 
 
 def called(component: str, entity: str, tick: int, call: Callable[..., Result], *arguments: Any) -> Result:
-    """Return what a call of a form returns. Raises ComponentError."""
+    """Return the value of a call of a form. Raises ComponentError."""
     try:
         return call(*arguments)
     except BaseException as error:
@@ -70,7 +69,7 @@ def called(component: str, entity: str, tick: int, call: Callable[..., Result], 
 
 
 def has_together(kind: type[Any], alone: str) -> bool:
-    """Whether a class has `together`, and not only one that it inherits beside another method `alone` of its own."""
+    """Whether a class has `together` that fits its method `alone`: one inherited beside another `alone` does not."""
     own: type[Any] = next((one for one in kind.__mro__ if "together" in vars(one) or alone in vars(one)), object)
     return vars(own).get("together") is not None
 
@@ -79,8 +78,8 @@ def has_together(kind: type[Any], alone: str) -> bool:
 class Slot:
     """A field of an entity in the frame: the place of its first number, and how many there are.
 
-    `is_own`: the component that asked for it declared it, and may write it. `is_others`: it is a field of another
-    entity than the component's, which reads what it was at the start of the tick, whichever node computes that one.
+    `is_own`: the component declared it, and may write it. `is_others`: it is a field of another entity than the
+    component's, whose value is that of the start of the tick, in any node.
     """
 
     at: int
@@ -96,11 +95,11 @@ class Slot:
 
 
 class View:
-    """What a component sees of the world in one tick: the numbers of the frame, by slots.
+    """A component's view of the world in one tick: the numbers of the frame, by slots.
 
-    `numbers` are those of all entities, SI units, in the world frame of reference; they are not written to directly.
-    Those of other entities than the component's may be of the tick's start or of its end, as nodes share the work: they
-    are read by `read`, which gives what they were at the start, or from `start`, all numbers as they were then.
+    `numbers` are those of all entities, SI units, in the world frame of reference; they are never written to directly.
+    Those of other entities than the component's may be of the tick's start or of its end, as nodes share the work:
+    `read` returns the values at the start, and `start` has all numbers of that time.
     """
 
     __slots__ = ("_values", "count", "numbers", "start", "tick")
@@ -116,12 +115,12 @@ class View:
         self.numbers = numbers
         self.start = numbers if start is None else start
         self.count = 0
-        """How many commands an actuator has had in the tick before this one; 0 for readings."""
+        """The count of commands that an actuator has had in the tick before this one; 0 for readings."""
         self._values = values
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """The numbers as an array, which is not written to."""
+        """The numbers as an array, to be read only."""
         if self._values is None:
             import numpy as np
 
@@ -136,9 +135,9 @@ class View:
 
 
 def some_together(what: str, tick: int, made: Any, members: Sequence[Any], rows: NDArray[np.intp]) -> Any:
-    """Return what some of several components are together, by their rows; `made` is what all of them are.
+    """Return the `together` object of some of several components, by their rows; `made` is that of all of them.
 
-    It is taken from that where that can be. Raises ComponentError, which names them as `what`.
+    It is taken from `made` where that has `taken`. Raises ComponentError, which names them as `what`.
     """
     if hasattr(made, "taken"):
         return called(what, "", tick, made.taken, rows)
@@ -178,7 +177,7 @@ class WritableView(View):
         written: list[float] | None = None,
         values: NDArray[np.float64] | None = None,
     ) -> None:
-        """`written` are other numbers than those that are read, where motions write the state at the end of a tick;
+        """`written` are other numbers than the read ones, where motions write the state at the end of a tick;
         `values` are the numbers as an array where there is one already."""
         self.tick, self.numbers, self.count = tick, numbers, 0  # as a View has them: there are several in each tick
         self.start = numbers if start is None else start
@@ -195,7 +194,7 @@ class WritableView(View):
         return self._written
 
     def count_command(self, actuator: object) -> None:
-        """Say in `count` how many commands of the tick an actuator has had before this one."""
+        """Set `count` to the commands of the tick that an actuator has had before this one."""
         self.count = self._commands.get(actuator, 0)
         self._commands[actuator] = self.count + 1
 
@@ -215,7 +214,7 @@ class WritableView(View):
 
 
 class SensingView(WritableView):
-    """A view in which sensors and their modifiers remember: what they write is in the next frame, not in this one."""
+    """A view in which sensors and their modifiers write their slots: into the next frame, not into this one."""
 
     __slots__ = ("not_finite", "written")
 
@@ -225,7 +224,7 @@ class SensingView(WritableView):
         self.written: dict[int, float] = {}
         """Numbers of the next frame, by place."""
         self.not_finite: list[Any] = []
-        """Sensors whose reading has a number that is not finite."""
+        """Sensors whose reading has a non-finite number."""
 
     def write(self, slot: Slot, *values: float) -> None:
         """Write all numbers of a slot, which the component must have declared."""
@@ -235,14 +234,14 @@ class SensingView(WritableView):
 
 def check_write(slot: Slot, values: Sequence[float]) -> None:
     """Assert that a component may write these numbers to a slot."""
-    assert slot.is_own, f"it writes {slot.name}, which is not its own and not declared in its writes"
+    assert slot.is_own, f"it writes {slot.name}, neither its own slot nor declared in its writes"
     assert len(values) == slot.size, f"{len(values)} numbers for {slot.name}, which has {slot.size}"
     assert all(map(isfinite, values)), f"{', '.join(map(str, values))} for {slot.name}: numbers of a frame are finite"
 
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """Where a component is: on which entity of which world, under which name, and the key of its draws.
+    """The mounting of a component: its world, its entity, its name, and the key of its draws.
 
     `writes` are the fields of the entity itself that it may write, beside its own slots. `is_owners`: its slots are the
     owner's, as those of sensors; a rule of one name has the solver's.
@@ -266,14 +265,14 @@ class Mounting:
         )
 
     def of(self, entity: Entity, field: str) -> Slot:
-        """Return a field of any entity, to be read: of another one as it was at the start of the tick."""
+        """Return a field of any entity, to be read: of another one its value at the start of the tick."""
         is_others = entity.index != self.robot.index
         return Slot(entity.offsets[field], entity.counts[field], f"{entity.name} {field}", False, is_others)
 
 
 @dataclass(frozen=True, slots=True)
 class ModifierMounting:
-    """What a modifier is on: the numbers of a reading or command, with the bounds of each, and the key of its draws.
+    """The mounting of a modifier: the numbers of a value, with the bounds of each, and the key of its draws.
 
     `period_s` is the time between two readings, `period_ticks` the least number of ticks between them: where the period
     is not whole ticks, some are one tick farther apart. Those of commands are a tick's.
@@ -293,7 +292,7 @@ class ModifierMounting:
         return self.mounting.slot(field)
 
     def per_field(self, written: Any, other: float) -> list[float]:
-        """Return a setting's number for each number, and `other` for those of which it says nothing, as None does."""
+        """Return a setting's number for each number, and `other` where the setting has none or is None."""
         if written is None:
             return [other] * self.numbers.size
         return [other if number is None else number for number in read_per_field(written, self.numbers)]

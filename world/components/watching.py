@@ -1,6 +1,6 @@
-"""Forms that are watched: whoever changes a number of the frame by anything but `view.write` fails in that line.
+"""Guarded forms: a line of theirs that changes a number of the frame without `view.write` raises.
 
-Checks of components and trials watch; a run does not, since that costs more than most forms do.
+Checks of components and trials use guards; a run does not, since a guard costs more than most forms.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ReadOnly(list[float]):
 
 
 class _Seen(Sequence[float]):
-    """The numbers of a view, which change as that writes them, and cannot be written themselves."""
+    """The numbers of a view, read-only: they change as the view writes them."""
 
     __slots__ = ("_numbers",)
 
@@ -46,7 +46,7 @@ class _Seen(Sequence[float]):
 
 
 class WriteGuard:
-    """A form whose calls can only read the numbers that they are given."""
+    """A form whose calls get their numbers read-only."""
 
     def __init__(self, made: Any) -> None:
         self._made = made
@@ -56,7 +56,7 @@ class WriteGuard:
         if not callable(found):
             return found
 
-        @wraps(found)  # where messages find the method
+        @wraps(found)  # messages find the method there
         def call(*arguments: Any) -> Any:
             views = [(one, one.numbers, one.start) for one in arguments if isinstance(one, View)]
             if not views:  # lists beside a view are a value's numbers, not a frame's
@@ -73,12 +73,12 @@ class WriteGuard:
 
 
 def guarded(made: Any) -> Any:
-    """Return a form that is watched; of any type, since it has the methods of what it was."""
+    """Return a form with a guard; typed Any, since it has the methods of the form."""
     return WriteGuard(made)
 
 
 def guarded_actuator(one: BoundActuator) -> BoundActuator:
-    """Return an actuator that is watched, with its modifiers."""
+    """Return an actuator with a guard, and guards of its modifiers."""
     return replace(one, actuator=guarded(one.actuator), modifiers=tuple(map(_guarded_modifier, one.modifiers)))
 
 

@@ -1,4 +1,4 @@
-"""Errors of other people's code on one line: what was raised, and the place in their own files."""
+"""Errors of user code on one line: the exception, and the place in the user's files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ VALUE_LENGTH_MAX: Final = 80
 
 
 class ContractError(Exception):
-    """A method of a form has returned something else than it must. `method` is where that is to be changed."""
+    """A method of a form has returned an invalid value; `method` has the place to change."""
 
     def __init__(self, method: Callable[..., Any], needed: str, given: object) -> None:
         name = getattr(method, "__name__", type(method).__name__)
@@ -36,13 +36,13 @@ def _value(given: object) -> str:
 def failure_of(error: BaseException, module: str = "") -> str:
     """Return `RuntimeError: at import (raises.py:3)` for an error that importing or calling a module has raised.
 
-    The place is in the innermost frame of that module's package, or of others that are in no library. Without a module
-    it is that of the first call that is not foosim's.
+    The place is in the innermost frame of that module's package, or of others outside of libraries. Without a module it
+    is that of the first call outside of foosim.
     """
-    kind, text = type(error).__name__, "its text cannot be made"
+    kind, text = type(error).__name__, "its text cannot be read"
     with suppress(Exception):  # the user's own code, too
-        said = error.msg if isinstance(error, SyntaxError) else str(error)  # which has its place behind it
-        text = " ".join(said.split())
+        message = error.msg if isinstance(error, SyntaxError) else str(error)  # which ends with its place
+        text = " ".join(message.split())
     text = text if len(text) <= TEXT_LENGTH_MAX else f"{text[: TEXT_LENGTH_MAX - 3]}..."
     if isinstance(error, ContractError):
         return text + place_of_code(error.method)
@@ -62,7 +62,7 @@ def _place_of(error: BaseException, module: str) -> str:
 
 
 def place_of_code(made: Any) -> str:
-    """Return ` (file:line)` of the first line of a method or class; empty of one that is not of Python."""
+    """Return ` (file:line)` of the first line of a method or class; empty of one outside of Python."""
     with suppress(OSError, TypeError):  # without source
         made = unwrap(getattr(made, "__func__", made))
         code = getattr(made, "__code__", None)
@@ -77,7 +77,7 @@ def _package(frame: FrameType) -> str:
 
 
 def _is_own(frame: FrameType, module: str) -> bool:
-    """Whether a frame is in a module's package, in no library and not in foosim, or in that very module of foosim's."""
+    """Whether a frame is in a module's package, outside of libraries and foosim, or in that module of foosim's."""
     package = _package(frame)
     if package == OURS:
         return frame.f_globals.get("__name__") == module
@@ -92,7 +92,7 @@ def in_library(file: str) -> bool:
 
 @cache
 def _libraries() -> tuple[str, ...]:
-    import site  # takes longer than all else here, and few processes ask
+    import site  # takes longer than all else here, and few processes need it
     import sysconfig
 
     paths = sysconfig.get_paths()
@@ -101,6 +101,6 @@ def _libraries() -> tuple[str, ...]:
 
 
 def _shown(file: str) -> str:
-    """Return a file as it is called in its folder of the path."""
+    """Return a file's path inside its folder of the path."""
     folders = [f"{folder}/" for folder in sys.path if folder and file.startswith(f"{folder}/")]
     return file.removeprefix(max(folders, key=len, default=""))

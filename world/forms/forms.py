@@ -1,4 +1,4 @@
-"""What there is to know of a registered form without making one: what it needs, remembers and writes."""
+"""Descriptions of registered forms: their settings, slots, needs and writes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class References(int):
-    """How many references to entities a slot has, in place of numbers.
+    """The count of references to entities in a slot, in place of numbers.
 
     A reference is the index of an entity, -1 for none: it becomes that when its entity leaves the world.
     """
@@ -30,14 +30,14 @@ ENTITY: Final = References(1)
 NO_ENTITY: Final = -1.0
 
 SAMPLES: Final = "samples"
-"""The slot of each sensor that counts what it has sampled; no component declares one of this name."""
+"""The slot of each sensor that counts its samples; no component declares one of this name."""
 BASE_CLASSES: Final = "foosim.world.components.base"
 """The module of the base classes of components."""
 ROBOTS: Final = "*"
 SLOTS_MAX: Final = 65_536
 """Numbers in all slots of one component, model, motion or rule."""
 WORDS: Final[Mapping[str, str]] = MappingProxyType({"entity_rule": "rule of entities", "rule": "rule of worlds"})
-"""What forms are called, where that is not their name."""
+"""The nouns of forms, where these differ from their names."""
 NO_SLOTS: Final[Mapping[str, int]] = MappingProxyType({})
 NO_SETTINGS: Final[Mapping[str, float | None]] = MappingProxyType({})
 
@@ -46,7 +46,7 @@ BODY: Final[Mapping[str, int]] = MappingProxyType(
 )
 """The fields of a free rigid body: SI units, in the world frame, orientation as a quaternion x, y, z, w."""
 LINEAR_VELOCITY: Final = "linear_velocity"
-"""The field that a rigid body has which nothing holds."""
+"""A field of free rigid bodies only."""
 JOINTS: Final = ("joint_positions", "joint_velocities", "joint_efforts")
 """The fields of a jointed rigid body, a number for each joint: m or rad, m/s or rad/s, N or N m. An effort is what the
 joint's motor applied in the last substep."""
@@ -59,7 +59,7 @@ PARTNERS_MAX: Final = 4
 PARTNERS: Final[Mapping[str, int]] = MappingProxyType(
     {"partners": References(PARTNERS_MAX), "partner_impulses": PARTNERS_MAX}
 )
-"""Whom a rigid body touched in the last tick, of at most four entities with the greatest impulses, in name order; and
+"""The entities that a rigid body touched in the last tick, at most four with the greatest impulses, in name order; and
 these impulses (N s)."""
 TOUCHES_MAX: Final = 2
 TOUCHES: Final[Mapping[str, int]] = MappingProxyType(
@@ -73,23 +73,23 @@ TOUCHES: Final[Mapping[str, int]] = MappingProxyType(
         "touch_impulses": TOUCHES_MAX,
     }
 )
-"""With whom the links of a jointed body were in contact in the last tick, of at most two with the greatest impulses in
-the order in which they began: how many contacts began; of each its partner, the index of the link, the place along the
+"""Contacts of the links of a jointed body in the last tick, at most two with the greatest impulses in the order in
+which they began: the count of contacts that began; of each its partner, the index of the link, the place along the
 axis of the first joint, from that joint (m), the first and the last substep, and the impulse (N s)."""
 STILL_TICKS: Final = "still_ticks"
 STILL_POSE: Final = "still_pose"
 POSE: Final = ("position", "orientation", "joint_positions")
 RESTING: Final[Mapping[str, int]] = MappingProxyType({STILL_TICKS: 1})
-"""How many ticks a rigid body has been still: bodies of an island that all have been for long are at rest. What has it
-has `still_pose` besides, of as many numbers as the fields of its pose: where it has stayed."""
+"""The count of ticks that a rigid body has been still: an island of bodies that all have been for long is at rest. A
+body with this field has also `still_pose`, its pose in these ticks, with the numbers of its pose's fields."""
 
 
 @dataclass(frozen=True, slots=True)
 class Carrier:
-    """What a component is on: how many numbers a value has, and the least time in which they follow each other: whole
-    ticks (ns); how many joints its robot has.
+    """What carries a component: the count of numbers in a value, the least time between two values (whole ticks, ns),
+    and the count of joints of its robot.
 
-    Commands come in a tick's time at the earliest. A sensor or actuator is on no numbers, a modifier on no robot.
+    Commands come in a tick's time at the earliest. A sensor or actuator has no numbers here, a modifier no robot.
     """
 
     size: int
@@ -98,23 +98,23 @@ class Carrier:
 
 
 def overrides(kind: Callable[..., Any], hook: str) -> bool:
-    """Whether a class of components has a hook of its own, and not the empty one of its base class."""
+    """Whether a class of components has a hook of its own instead of the empty one of its base class."""
     having = [one for one in getattr(kind, "__mro__", ()) if hook in vars(one)]
     return bool(having) and having[0].__module__ != BASE_CLASSES
 
 
 def word_of(form: str) -> str:
-    """Return what one of a form is called."""
+    """Return the noun of a form."""
     return WORDS.get(form, form)
 
 
 def with_article(noun: str) -> str:
-    """Return a noun behind `a` or `an`."""
+    """Return a noun after `a` or `an`."""
     return f"{'an' if noun[:1] in 'aeiou' else 'a'} {noun}"
 
 
 def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
-    """Return what is wrong with slots: a mapping of names to counts of numbers; empty if nothing is."""
+    """Return the problem of slots, a mapping of names to counts of numbers; empty without one."""
     if not isinstance(slots, Mapping):
         return f"they are a mapping of names to counts of numbers, not {show(slots)}"
     numbers = 0
@@ -130,34 +130,33 @@ def slots_problem(slots: object, *, is_sensor: bool = False) -> str:
 
 
 ABSENT: Final = "absent"
-"""The slot of each entity that has a place: 1 of one that is not in the world, 0 of one that is."""
+"""The slot of each entity with a place: 1 while it is absent from the world, else 0."""
 INACTIVE: Final = "inactive"
-"""The slot of each robot with components that says which are switched off: a bit for each of its sensors and actuators,
-the lowest for the first by name."""
+"""The slot of each robot with components for the switched-off ones: a bit for each of its sensors and actuators, the
+lowest for the first by name."""
 DOWN: Final = "down"
 OF_ROBOTS: Final = (DOWN, "refused", "clamped")
-"""Fields that each robot has: whether it is out of service, and how many commands it has refused and clamped."""
+"""Fields of each robot: whether it is out of service, and the counts of commands that it has refused and clamped."""
 SET_BY_FOOSIM: Final = ("at", DOWN)
-"""What can be set of entities without a word of their model."""
+"""Fields that can be set of entities of each model."""
 OF_SOLVED: Final = ("quarantined",)
-"""Fields that each entity has that a node solves: whether it stays as it is, since its state could not be."""
+"""Fields of each solved entity: whether it keeps its last state, since its new one was invalid."""
 
 SlotsOf: TypeAlias = Callable[[Any, Carrier], Mapping[str, int]]
-"""The slots of a component, by its settings and what it is on; a sensor or actuator is on no numbers. Raises BadValue
-for settings that do not fit that."""
+"""The slots of a component, by its settings and its carrier. Raises BadValue for settings that do not fit that."""
 FieldsOf: TypeAlias = Callable[[Any, Any], Mapping[str, int]]
-"""The fields of an entity's state, by its settings (None of what is no robot) and the world (`WorldSpec`) with its
-files. Raises BadValue for settings of which none follow."""
+"""The fields of an entity's state, by its settings (None except of robots) and the world (`WorldSpec`) with its
+files. Raises BadValue for settings without valid fields."""
 
 
 def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sensor: bool = False) -> Mapping[str, int]:
-    """Return what a function of a form says of its slots. Raises BadValue where it fails, or what it says is wrong."""
+    """Return the slots that a function of a form returns. Raises BadValue where it fails, or returns invalid slots."""
     try:
         found = slots_of(*arguments)
     except (BadValue, KeyboardInterrupt):
         raise
     except BaseException as error:  # SystemExit, too: a function may do anything
-        raise BadValue(f"its slots are not known: {failure_of(error)}", name) from error
+        raise BadValue(f"its slots failed: {failure_of(error)}", name) from error
     problem = slots_problem(found, is_sensor=is_sensor)
     if problem:
         raise BadValue(f"its slots are wrong: {problem}", name)
@@ -165,16 +164,16 @@ def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sen
 
 
 TriggerOf: TypeAlias = Callable[[Any], str]
-"""What makes a sensor measure besides its rate, by its settings."""
+"""The trigger of a sensor beside its rate, by its settings."""
 ArrayLengthOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
-"""How many numbers the last fields of a reading have, by the settings and by how many each field of the robot has."""
+"""The counts of numbers of a reading's last fields, by the settings and the counts of the robot's fields."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComponentType:
     """A registered class: its form and name, the class, and the model of its settings.
 
-    `kit` is the section that a deployment must have, empty where any world will do.
+    `kit` is the section that a deployment must have, empty where it fits any world.
     """
 
     type_name: str
@@ -185,12 +184,12 @@ class ComponentType:
 
     @property
     def module(self) -> str:
-        """The module that it is in."""
+        """The module of the class."""
         return self.factory.__module__
 
     @property
     def is_own(self) -> bool:
-        """Whether it is foosim's own, and not of another package."""
+        """Whether it is foosim's own, rather than of another package."""
         return self.module.startswith("foosim.")
 
     @property
@@ -203,15 +202,15 @@ class ComponentType:
 class Component(ComponentType):
     """A sensor, actuator or modifier.
 
-    `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers that it remembers, by
+    `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers of its state, by
     field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
-    that the model of its robot must have. `array_length` is the setting that says how many numbers the last field of a
-    reading has, if it has several, or a function that says it; of several such fields, how many each of them has.
-    `moves` says that an actuator commands the motors of its robot, `joints` which: it is the setting that names their
-    joints, in the order of what the actuator asks. All are meant without such a setting, and where that is None. No
-    motor is commanded by two actuators. `jobs` says that its commands may be jobs (`forms.jobs`).
+    that the model of its robot must have. `array_length` is the setting with the count of numbers of a reading's last
+    fields, where these have several each, or a function that returns it.
+    `moves`: an actuator commands the motors of its robot. `joints` is the setting that names their joints, in the order
+    of the actuator's set-points; without such a setting, or with None, it commands all. No motor is commanded by two
+    actuators. `jobs`: its commands may be jobs (`forms.jobs`).
     `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
-    tick at whose start its first number is not 0; or a function that says it, which may name a slot of an actuator.
+    tick at whose start its first number is not 0; or a function that returns it, maybe a slot of an actuator.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
     `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
     None without a least one.
@@ -229,14 +228,14 @@ class Component(ComponentType):
     per_field: Mapping[str, float | None] = field(default_factory=dict)
 
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
-        """Return its slots with these settings. Raises BadValue where these do not fit what it is on, or no slots
-        follow from them."""
+        """Return its slots with these settings. Raises BadValue where these do not fit its carrier, or give no valid
+        slots."""
         if not callable(self.slots):
             return self.slots
         return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.type_name == "sensor")
 
     def trigger_by(self, settings: Any) -> str:
-        """Return what makes a sensor with these settings measure besides its rate; empty for nothing."""
+        """Return the trigger of a sensor with these settings beside its rate; empty without one."""
         return self.trigger(settings) if callable(self.trigger) else self.trigger
 
     def joints_named(self, settings: Any) -> Sequence[str] | None:
@@ -251,25 +250,25 @@ class Component(ComponentType):
 class Model(ComponentType):
     """A model of entities.
 
-    `slots` are the fields of its state, or a function of settings and world that returns them. Those that foosim itself
-    needs it has whatever it declares: robots `down`, `refused` and `clamped`, what is solved `quarantined`. An engine
-    solves one that is rigid; one with a `motion`, a class derived from `components.base.Motion`, moves by that; any
-    other stays as it is. A robot has an owner, and sends and receives packets. `actuators` and `rules` are those of a
-    robot that says nothing of them, as in a deployment. `units` are those of its fields' numbers, the last one standing
-    for all behind it; fields that every model calls the same need none. `variants` are what it is instead where its
-    setting `dynamics` has one of these values. `settable` is what can be set of it, as of a rule of entities
-    (`EntityRule`): fields of its state.
+    `slots` are the fields of its state, or a function of settings and world that returns them. foosim adds
+    fields to the declared ones: `down`, `refused` and `clamped` to robots, `quarantined` to solved entities. An engine
+    solves a rigid model; one with a `motion`, a class derived from `components.base.Motion`, moves by that; any other
+    never changes. A robot has an owner, and sends and receives packets. `actuators` and `rules` are the defaults of a
+    robot's settings, as in a deployment. `units` are those of its fields' numbers, the last one for all further ones;
+    fields with the same name in every model need none. `variants` are descriptions in its place where its setting
+    `dynamics` has one of these values. `settable` are fields of its state that can be set, as of a rule of entities
+    (`EntityRule`).
     """
 
     slots: Mapping[str, int] | FieldsOf = field(default_factory=dict)
     is_robot: bool = True
     has_body: bool = True
-    """Whether it is somewhere, with an antenna; else only a place of the network can say where."""
+    """Whether it has a place in the world, with an antenna; else only the network can give it a place."""
     on_demand: Mapping[str, int] = field(default_factory=dict)
-    """Further fields that an entity of it has where a component of it needs them."""
+    """Further fields of an entity with a component that needs them."""
     is_rigid: bool = False
     couples: bool = True
-    """Whether something in it couples its parts, as the motors of an arm do: its island has a solve of its own."""
+    """Whether its parts are coupled, as by the motors of an arm: its island has a solve of its own."""
     motion: type[Any] | None = None
     actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     rules: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -279,17 +278,17 @@ class Model(ComponentType):
     variants: Mapping[str, Model] = field(default_factory=dict)
 
     def variant(self, dynamics: object) -> Model:
-        """Return what entities of it are whose setting `dynamics` has this value."""
+        """Return the description of its entities whose setting `dynamics` has this value."""
         return self.variants.get(dynamics, self) if isinstance(dynamics, str) else self
 
     @property
     def is_solved(self) -> bool:
-        """Whether a node computes its next state; that of any other stays as it is."""
+        """Whether a node computes its next state; that of any other never changes."""
         return self.is_rigid or self.motion is not None
 
     @property
     def mover(self) -> str:
-        """What moves its entities, in a word."""
+        """The mover of its entities, in a word."""
         return "an engine" if self.is_rigid else "nothing" if self.motion is None else self.motion.__name__
 
     @property
@@ -304,13 +303,13 @@ class Model(ComponentType):
 
     @property
     def can_be_free(self) -> bool:
-        """Whether its entities are rigid bodies that nothing holds, or some may be."""
+        """Whether its entities are free rigid bodies, or some may be."""
         return self.is_rigid and (self.declared is None or LINEAR_VELOCITY in self.declared)
 
     def fields_of(self, settings: Any, spec: Any) -> Mapping[str, int]:
-        """Return the fields of the state of an entity with these settings (None of what is no robot).
+        """Return the fields of the state of an entity with these settings (None except of robots).
 
-        Raises BadValue where none follow from them.
+        Raises BadValue where these have no valid fields.
         """
         if not callable(self.slots):
             return self.slots
@@ -318,7 +317,7 @@ class Model(ComponentType):
         return {**found, **{slot: 1 for slot in self.needed if slot not in found}}
 
     def demanded(self, needs: Iterable[str]) -> dict[str, int]:
-        """Return the fields on demand that are among what the components of an entity need."""
+        """Return the fields on demand that the components of an entity need."""
         needed = {*needs}
         return {slot: count for slot, count in self.on_demand.items() if slot in needed}
 
@@ -330,11 +329,11 @@ class Model(ComponentType):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldRule(ComponentType):
-    """What a world does by itself, before a tick is solved.
+    """A change of the world by itself, before a tick is solved.
 
-    `slots` are what it remembers, as `NAME.FIELD` of the entity `world`, NAME being that of the rule in its world;
-    `each` are what it remembers of the entities of a model (`ROBOTS`: of all robots), as `NAME.FIELD`. `writes` are the
-    models whose state it may change. `settable` is what can be set of it, as of a rule of entities (`EntityRule`).
+    `slots` are its state, as `NAME.FIELD` of the entity `world`, NAME being that of the rule in its world; `each` are
+    its state of the entities of a model (`ROBOTS`: of all robots), as `NAME.FIELD`. `writes` are the models whose state
+    it may change. `settable` are its fields that can be set, as of a rule of entities (`EntityRule`).
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)
@@ -345,12 +344,12 @@ class WorldRule(ComponentType):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EntityRule(ComponentType):
-    """What an entity does by itself, after it was solved, computed by the node that solves it.
+    """A change of an entity by itself, after it was solved, computed by the node that solves it.
 
-    `slots` are what it remembers, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` those
-    that it changes. `shared` are slots that a model may have as fields of these names: of such a model it writes them.
-    `settable` is what can be set of it while a run goes on, and the limits: slots of its own with one number; or what
-    its method `set(field, value)` returns, numbers by slot. Values are in SI units.
+    `slots` are its state, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` the fields that
+    it changes. `shared` are slots that a model may have as fields of these names: of such a model it writes them.
+    `settable` are fields that can be set during a run, and the limits: slots of its own with one number; or the numbers
+    by slot that its method `set(field, value)` returns. Values are in SI units.
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)
@@ -365,17 +364,17 @@ class EntityRule(ComponentType):
 
     @property
     def written(self) -> tuple[str, ...]:
-        """The fields of an entity that it may change, where they are there."""
+        """The fields of an entity that it may change, where the entity has them."""
         return (*self.writes, *self.shared)
 
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """What computes rigid bodies: `module:Class` of what is made from deployment and layout (`node.physics.interface`).
+    """An engine of rigid bodies: `module:Class`, called with deployment and layout (`node.physics.interface`).
 
-    `meshes` says that it has scenery of triangles, `islands` that it has bodies of any kind, and solves islands one
-    after the other (`IslandEngine`). Any other has rods and balls of a table. `grasps` says that it holds two bodies
-    together as `Island.welds` say.
+    `meshes`: it has scenery of triangles. `islands`: it has bodies of any kind, and solves islands one after the other
+    (`IslandEngine`); any other has rods and balls of a table. `grasps`: it holds two bodies together by
+    `Island.welds`.
     """
 
     name: str
@@ -402,16 +401,16 @@ ENGINES: Final[dict[str, Engine]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene(ComponentType):
-    """Scenery that never moves, made from settings."""
+    """Scenery that never moves, by settings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kit(ComponentType):
-    """A section of a deployment that makes a world from few numbers.
+    """A section of a deployment that builds a world by few numbers.
 
-    `entities` are what is in the world beside the robots, their models by name; `spares` returns the same of what is
-    absent at the start, from the section; `rules` are the rules of the world, by name. `presets` are whole sections, as
-    plain data, by name: a section may name one in place of what it leaves out.
+    `entities` are those of the world beside the robots, their models by name; `spares` returns the same of entities
+    that are absent at the start, by the section; `rules` are the rules of the world, by name. `presets` are whole
+    sections, as plain data, by name: a section may name one for its missing keys.
     """
 
     entities: Mapping[str, str] = field(default_factory=dict)

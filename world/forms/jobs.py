@@ -1,7 +1,7 @@
-"""Jobs: commands with a number, of which an actuator tells how they end.
+"""Jobs: commands with a number, of which an actuator reports the end.
 
 A command that may be a job has a last field `job`. Its number grows with each job of a sender; the negative number
-cancels that job; without it, or with 0, it is a plain command. What an actuator knows of its jobs is slots, a row for
+cancels that job; without it, or with 0, it is a plain command. An actuator's state of its jobs is slots, a row for
 each endpoint that the deployment lets command the robot, in name order.
 """
 
@@ -22,15 +22,15 @@ RUNNING: Final = "jobs_running"
 CHANGED: Final = "jobs_changed"
 SLOTS: Final = (NUMBERS, STATES, RUNNING, CHANGED)
 """The slots of an actuator with jobs: of each sender the number of its last job, and its state; the row of the sender
-whose job runs, counted from 1, 0 of nobody; whether any of these changed in the last tick."""
+whose job runs, counted from 1, 0 without one; whether any of these changed in the last tick."""
 
 FAILURE: Final = "failure"
-"""The slot of an actuator that says why it could not do what it was told last, 0 where it could. Its class has the
-sentences by these numbers, `FAILURES`."""
+"""The slot of an actuator with the reason why its last command failed, 0 where it did not. Its class has the sentences
+by these numbers, `FAILURES`."""
 
 
 class JobState(IntEnum):
-    """How the last job of a sender stands; what is above `RUNNING` is how it ended."""
+    """The state of the last job of a sender; values above `RUNNING` are ends."""
 
     NONE = 0
     RUNNING = 1
@@ -41,7 +41,7 @@ class JobState(IntEnum):
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing more comes of it."""
+        """Whether the job has ended."""
         return self > JobState.RUNNING
 
 

@@ -23,9 +23,9 @@ from foosim.world.forms.jobs import JOB
 
 FLOAT: Final = frozenset((float,))
 PLAIN: Final = bytes(8)
-"""The number of a job in a command that is none."""
+"""The number of a job in a plain command."""
 MANY_MAX: Final = 1 << 16
-"""Numbers in a tuple whose type has no bound of its own."""
+"""The greatest count of numbers in a tuple whose type has no bound of its own."""
 
 Value: TypeAlias = Struct | bytes
 
@@ -56,7 +56,7 @@ class PayloadCodec:
         self._packed = struct.Struct(f"<{count}d")
         bounds = [_bounds(field.type) for field in _info(kind).fields[count:]]
         self._least, self._most = max((least for least, _ in bounds), default=0), min((m for _, m in bounds), default=0)
-        """How long each of its tuples is at the least and at the most."""
+        """The least and the greatest length of each of its tuples."""
         self._other = msgspec.msgpack.Decoder(kind)
 
     @property
@@ -66,7 +66,7 @@ class PayloadCodec:
 
     @property
     def size(self) -> int | None:
-        """How many bytes each payload has, that of a plain command; None where they may differ."""
+        """The size of each payload (bytes), that of a plain command; None where sizes differ."""
         if not self.is_packed or self._least != self._most:
             return None
         return self._packed.size + 8 * self._many * self._most - 8 * self.has_job
@@ -77,7 +77,7 @@ class PayloadCodec:
         return ", ".join(dict.fromkeys(field.unit for field in self.fields if field.unit))
 
     def decode(self, payload: bytes) -> Any:
-        """Return the value in a payload; raises Malformed for one that is none, or has a number that is not finite."""
+        """Return the value in a payload; raises Malformed for an invalid one, or one with a non-finite number."""
         if not self.is_packed:
             try:
                 return self._other.decode(payload)
@@ -89,15 +89,15 @@ class PayloadCodec:
         if size == least and not self._many:
             numbers = self._packed.unpack(payload)
             if not all(map(isfinite, numbers)):
-                raise Malformed(f"{self.name} with numbers that are not finite")
+                raise Malformed(f"{self.name} with non-finite numbers")
             return self.kind(*numbers)
         return self._decode_many(payload)
 
     def decode_finite(self, payload: bytes) -> Any:
-        """Return the value in a payload; raises Malformed as `decode`, and for any other number that is not finite."""
+        """Return the value in a payload; raises Malformed as `decode`, and for any other non-finite number."""
         value = self.decode(payload)
         if not self.is_packed and not _is_finite(msgspec.to_builtins(value)):
-            raise Malformed(f"{self.name} with numbers that are not finite")
+            raise Malformed(f"{self.name} with non-finite numbers")
         return value
 
     def _decode_many(self, payload: bytes) -> Any:
@@ -110,11 +110,11 @@ class PayloadCodec:
             raise Malformed(f"{len(payload)} bytes, {what}")
         numbers = struct.unpack(f"<{len(payload) // 8}d", payload)
         if not all(map(isfinite, numbers)):
-            raise Malformed(f"{self.name} with numbers that are not finite")
+            raise Malformed(f"{self.name} with non-finite numbers")
         return self.from_numbers(numbers)
 
     def encode(self, value: Any) -> bytes:
-        """Return the payload of a value; raises BadValue for a number that is none or not finite."""
+        """Return the payload of a value; raises BadValue for an invalid or non-finite number."""
         assert isinstance(value, self.kind), f"{self.name} is a {self.kind.__name__}, not a {type(value).__name__}"
         if not self.is_packed:
             try:
@@ -135,7 +135,7 @@ class PayloadCodec:
     def encode_checked(self, value: Any) -> bytes:
         """Return the payload of a value that may hold anything.
 
-        Raises NotFinite for a number that is not finite, BadValue for what is not of its field's type.
+        Raises NotFinite for a non-finite number, BadValue for a value of another type than its field's.
         """
         payload = self.encode(value)
         if not self.is_packed:
@@ -144,15 +144,15 @@ class PayloadCodec:
             except msgspec.DecodeError as error:
                 raise BadValue(f"{self.name}: {error}", value) from None
             if not _is_finite(msgspec.to_builtins(value, enc_hook=_as_plain)):
-                raise NotFinite(f"{self.name} with numbers that are not finite")
+                raise NotFinite(f"{self.name} with non-finite numbers")
         return payload
 
     def encode_numbers(self, numbers: Sequence[float]) -> bytes:
-        """Return the payload of a value's numbers; raises NotFinite for one that is not finite."""
+        """Return the payload of a value's numbers; raises NotFinite for a non-finite one."""
         is_whole = not self._many and len(numbers) == len(self.fields)
         payload = self._packed.pack(*numbers) if is_whole else struct.pack(f"<{len(numbers)}d", *numbers)
         if not all(map(isfinite, numbers)):
-            raise NotFinite(f"{self.name} with numbers that are not finite", list(numbers))
+            raise NotFinite(f"{self.name} with non-finite numbers", list(numbers))
         return payload
 
     def from_numbers(self, numbers: Sequence[float]) -> Any:
@@ -165,7 +165,7 @@ class PayloadCodec:
         return self.kind(*numbers[:count], *(tuple(numbers[start : start + more]) for start in starts))
 
     def nothing(self) -> Any:
-        """Return a value of zeros and empty tuples: what cancels a job of which it is not known what it asks for."""
+        """Return a value of zeros and empty tuples: it cancels a job without its command."""
         return self.kind(*[0.0 if field.is_number else () for field in self.fields])
 
     def _check(self, field: str, number: Any) -> None:
@@ -179,7 +179,7 @@ class PayloadCodec:
             raise NotFinite(f"{self.name}.{field} is not finite", number)
 
     def numbers(self, value: Any) -> list[Any]:
-        """Return all numbers of a value, in the order of its fields; of what is not packed none. Raises BadValue."""
+        """Return all numbers of a packed value, in the order of its fields; of others none. Raises BadValue."""
         if not self.is_packed:
             return []
         values = list(msgspec.structs.astuple(value))
@@ -196,15 +196,15 @@ class PayloadCodec:
 
 
 def as_float(value: Any) -> float:
-    """Return a number as a float: one of Python, of numpy, or of any class that says how. Raises TypeError and
-    ValueError for what is none, OverflowError for one beyond all floats."""
+    """Return a number as a float: one of Python, of numpy, or of any class with `__float__`. Raises
+    TypeError and ValueError for other values, OverflowError for one beyond all floats."""
     if not hasattr(value, "__float__"):
         raise TypeError(f"a {type(value).__name__} is not a number")
     return float(value)
 
 
 def _as_plain(value: Any) -> Any:
-    """Return a number as a float and an array as a list of what is in it; raises as `as_float`."""
+    """Return a number as a float and an array as a list; raises as `as_float`."""
     return [*value] if _is_array(value) and value.ndim else as_float(value)
 
 
@@ -222,7 +222,7 @@ def _is_array(value: Any) -> bool:
 
 
 def many_of(fields: Sequence[Field]) -> int:
-    """Return how many fields at the end are several numbers each."""
+    """Return the count of fields at the end with several numbers each."""
     return next((number for number, field in enumerate(reversed(fields)) if not field.is_several), len(fields))
 
 

@@ -35,7 +35,7 @@ GROUPS: Final = "groups"
 
 
 def _written(value: object) -> object:
-    """Refuse what is neither a quantity nor quantities by name."""
+    """Refuse a value other than a quantity or quantities by name."""
     values = [*value.values()] if isinstance(value, dict) else [value]
     if not values or not all(isinstance(one, str | int | float) and not isinstance(one, bool) for one in values):
         raise custom_error(BadValue("not a quantity, nor quantities by the names of fields", value))
@@ -55,7 +55,7 @@ PerField: TypeAlias = Annotated[Quantity | dict[str, Quantity], BeforeValidator(
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """The numbers of a reading or command: their fields, the groups of these, and how many numbers there are.
+    """The numbers of a reading or command: their fields, the groups of these, and the count of numbers.
 
     Fields at the end may have several numbers each, all as many.
     """
@@ -86,10 +86,10 @@ _codec = cache(PayloadCodec)
 def numbers_of(
     component: Component, settings: ComponentSettings, counts: Mapping[str, int] = NO_SLOTS
 ) -> Numbers | None:
-    """Return the numbers of a component's readings or commands; None where these have something else, too, or as many
-    as nobody says.
+    """Return the numbers of a component's readings or commands; None where these have other fields too, or an unknown
+    count of numbers.
 
-    `counts` are how many numbers the fields of its robot have.
+    `counts` are the counts of numbers of the robot's fields.
     """
     fields = codec_of(component).fields
     many = many_of(fields)
@@ -103,9 +103,9 @@ def numbers_of(
 
 
 def payload_bytes(component: Component, settings: ComponentSettings, counts: Mapping[str, int]) -> int | None:
-    """Return how long a component's payload is at most; None where its type and settings do not limit it.
+    """Return the greatest length of a component's payload (bytes); None where its type and settings do not limit it.
 
-    `counts` are how many numbers the fields of its robot have: a command has at most a number for each joint.
+    `counts` are the counts of numbers of the robot's fields: a command has at most a number for each joint.
     """
     numbers = numbers_of(component, settings, counts)
     if numbers is not None:
@@ -123,9 +123,10 @@ def payload_bytes(component: Component, settings: ComponentSettings, counts: Map
 
 
 def read_per_field(written: Any, numbers: Numbers, least: float | None = None) -> list[float | None]:
-    """Return what was written for each number, in SI units; None for those of which nothing was.
+    """Return the quantity written for each number, in SI units; None for a number without one.
 
-    Raises UnknownName for a name that is none, BadValue for what is no quantity of a field's unit or below `least`.
+    Raises UnknownName for an unknown name, BadValue for a value other than a quantity of a field's unit, or below
+    `least`.
     """
     if not isinstance(written, Mapping):
         return [_read(written, numbers.field(place), least) for place in range(numbers.size)]

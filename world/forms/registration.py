@@ -1,4 +1,4 @@
-"""What a component declares when it registers itself: refused where it contradicts itself, with its name and module."""
+"""Checks of a component's description when it registers itself; errors have its name and module."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from foosim.world.forms.settings import BASES
 from foosim.world.forms.shown import MESSAGES
 
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
-"""What the values of a component are called."""
+"""The noun of a component's values."""
 TYPES: Final[Mapping[str, Any]] = {
     **dict.fromkeys(("kit", "joints"), str),
     **dict.fromkeys(("needs", "writes", "shared", "tags"), tuple[str, ...]),
@@ -36,11 +36,11 @@ TYPES: Final[Mapping[str, Any]] = {
     "entities": dict[str, str],
     "per_field": dict[str, float | None],
 }
-"""What the fields of a description are."""
+"""The types of a description's fields."""
 
 
 def check_form(found: Any) -> None:
-    """Refuse a component whose description cannot be so. Raises Refused."""
+    """Refuse a component with an invalid description. Raises Refused."""
     word, name = word_of(found.type_name), found.name
     if not (isinstance(name, str) and is_name(name)):
         raise Refused(f"{found.module} registers {with_article(word)} as {name!r}: {NAME_RULE}")
@@ -50,7 +50,7 @@ def check_form(found: Any) -> None:
 
 
 def _problems(found: Any) -> Iterator[str]:
-    """Yield what is wrong with a description. Each field is read only where those before it are right."""
+    """Yield problems of a description. Each field is read only where the fields before it are valid."""
     base, settings, bases = BASES.get(found.type_name, SpecBase), found.settings, getattr(found.factory, "__mro__", ())
     if bases and not any(vars(one).get("type_name") == found.type_name for one in bases):
         wanted = found.type_name.title().replace("_", "")
@@ -76,7 +76,7 @@ def _problems(found: Any) -> Iterator[str]:
 
 
 def _settings_named(found: Any) -> Iterator[str]:
-    """Yield the names of settings that there are not."""
+    """Yield unknown names of settings."""
     fields = found.settings.model_fields
     for key in ("array_length", "joints"):
         name = getattr(found, key, "")
@@ -89,7 +89,7 @@ def _settings_named(found: Any) -> Iterator[str]:
 
 
 def _values(found: Any) -> Iterator[str]:
-    """Yield what is wrong with the type of readings or commands."""
+    """Yield problems of the type of readings or commands."""
     word = VALUES.get(found.type_name)
     if word is None:
         return
@@ -127,7 +127,7 @@ def _slots(found: Any, key: str, slots: Any) -> Iterator[str]:
 
 
 def _shown_as(found: Any, codec: PayloadCodec) -> Iterator[str]:
-    """Yield what is wrong with the message that a sensor names."""
+    """Yield problems of the message that a sensor names."""
     needed = MESSAGES.get(str(found.shown_as))
     if needed is None:
         yield f"shown_as is one of {', '.join(MESSAGES)}, not {show(found.shown_as)}"

@@ -1,9 +1,9 @@
-"""The registry of forms: models, sensors, rules and whatever else a world is made of, by form and name.
+"""The registry of forms: models, sensors, rules and all other parts of a world, by form and name.
 
-Each stands in a file of its own and registers itself there, under the name by which deployments ask for it. One of
-foosim's own is in the folder of its form, or in a folder of that, in a module of its name; one of another package is in
-a module that the package names as an entry point of the group `foosim.world`; and `module:Class` names one of any
-module on the path. Modules are imported when one of theirs is asked for.
+Each is in a file of its own and registers itself there, under its name in deployments. One of foosim's own is in the
+folder of its form, or in a folder of that, in a module of its name; one of another package is in a module that the
+package names as an entry point of the group `foosim.world`; and `module:Class` names one of any module on the path.
+A module is imported when one of its forms is looked up.
 """
 
 from __future__ import annotations
@@ -49,20 +49,20 @@ LIBRARY: Final = "foosim.library"
 """Where foosim's own are: each in a module of its name, in a folder for the kind of world."""
 FORMS: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit")
 BY_CLASS: Final = "module:Class"
-"""What names a form beside its name."""
+"""The notation of a form by its class, beside its name."""
 
 Made = TypeVar("Made", bound=Callable[..., Any])
 
 
 class Decorator(Protocol):
-    """What registers a class, and returns it."""
+    """A decorator that registers a class, and returns it."""
 
     def __call__(self, made: Made, /) -> Made: ...
 
 
 _known: Final[dict[tuple[str, str], ComponentType]] = {}
 _loaded: Final[dict[str, str]] = {}
-"""Of each entry point that was loaded: why that failed, empty if it did not."""
+"""The error of each entry point that was loaded, empty without one."""
 
 
 def sensor(name: str, settings: type[ComponentSettings], reading: type[Struct], **about: Any) -> Decorator:
@@ -86,7 +86,7 @@ def modifier(name: str, settings: type[ComponentSettings], **about: Any) -> Deco
 def model(name: str, settings: type[EntitySettings], **about: Any) -> Decorator:
     """Register a model: a class derived from `components.base.Model`; `about` are fields of `forms.Model`.
 
-    The fields that foosim itself needs, and that it does not declare, come after those that it does. `variants` are
+    Fields that foosim itself needs come after the declared ones. `variants` are
     classes of the same module by the value of the setting `dynamics`, each with the fields that differ:
     `{"rigid": {"factory": Rigid, "is_rigid": True, ...}}`.
     """
@@ -132,7 +132,7 @@ def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **a
 
 
 def _described(kind: type[Any], about: dict[str, Any]) -> Any:
-    """Return the description of what is registered; that of a model has the fields that foosim needs, and variants."""
+    """Return the description of a form; that of a model has the fields that foosim needs, and variants."""
     variants = about.pop("variants", {})
     found = kind(**about)
     if not isinstance(found, Model):
@@ -148,10 +148,10 @@ def _described(kind: type[Any], about: dict[str, Any]) -> Any:
 
 
 def find(form: str, kind: str) -> ComponentType:
-    """Return what a deployment calls `kind`: a registered name, or `module:Class`.
+    """Return the form with this `kind` in a deployment: a registered name, or `module:Class`.
 
-    Raises UnknownName, which says what is nearest, and BadValue for a module that cannot be imported, or a class in it
-    that is not registered.
+    Raises UnknownName, which has the nearest name, and BadValue for a module that cannot be imported, or an
+    unregistered class in it.
     """
     found = lookup(form, kind)
     if found is None:
@@ -160,13 +160,13 @@ def find(form: str, kind: str) -> ComponentType:
 
 
 def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
-    """Return the error for a name that nothing has, with the packages that could not be imported."""
+    """Return the error for an unknown name, with the packages that could not be imported."""
     others = () if form == "engine" else (f"any {BY_CLASS}",)
     return UnknownName("; ".join([f"unknown {word_of(form)}", *load_entry_points()]), kind, choices, *others)
 
 
 def lookup(form: str, kind: str) -> ComponentType | None:
-    """Return what `find` does, or None where nothing has that name; raises BadValue for a class as `find` does."""
+    """Return the form as `find`, or None for an unknown name; raises BadValue for a class as `find` does."""
     if ":" in kind:
         return _of_class(form, kind)
     found = _known.get((form, kind)) or _own(form, kind)
@@ -204,7 +204,7 @@ def find_model(kind: str) -> Model:
 
 
 def names(form: str) -> list[str]:
-    """Return the names of all that are installed here, in name order: foosim's own, and those of other packages."""
+    """Return the names of all installed forms, in name order: foosim's own, and those of other packages."""
     for module in _own_modules().values():
         import_module(module)
     load_entry_points()
@@ -217,7 +217,7 @@ def names(form: str) -> list[str]:
 
 
 def load_entry_points() -> list[str]:
-    """Import the modules that other packages name; return why some could not be."""
+    """Import the modules that other packages name; return errors of imports."""
     for entry in _entry_points():
         if entry.value not in _loaded:
             _loaded[entry.value] = _load(entry)
@@ -246,7 +246,7 @@ def _load(entry: EntryPoint) -> str:
 
 
 def _own(form: str, name: str) -> ComponentType | None:
-    """Return one of foosim's own, imported from its module; None where there is none."""
+    """Return one of foosim's own, imported from its module; None for an unknown name."""
     if name in _own_modules():
         import_module(_own_modules()[name])
     return _known.get((form, name))
@@ -266,7 +266,7 @@ def _own_modules() -> Mapping[str, str]:
 
 
 def class_at(path: str) -> Any:
-    """Return what `module:Class` is, of a form or a player.
+    """Return the value of `module:Class`, for a form or a player.
 
     Raises BadValue for a module that cannot be imported, or has no such name; its nearest is a path that may be meant.
     """
@@ -308,7 +308,7 @@ def _not_found(path: str, missing: str) -> BadValue:
 
 
 def _of_class(form: str, path: str) -> ComponentType:
-    """Return the one that `module:Class` registered."""
+    """Return the form that `module:Class` registered."""
     made, module = class_at(path), path.partition(":")[0]
     of_form = [one for one in _known.values() if one.type_name == form]
     for one in of_form:
@@ -320,7 +320,7 @@ def _of_class(form: str, path: str) -> ComponentType:
 
 
 def _forget_new(known: Mapping[tuple[str, str], ComponentType]) -> None:
-    """Forget what modules have registered that then could not be imported; what they imported before stays."""
+    """Forget the registered forms of modules whose import then failed; their earlier imports stay."""
     for key in _known.keys() - known.keys():
         if _known[key].module not in sys.modules:
             del _known[key]

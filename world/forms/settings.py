@@ -1,4 +1,4 @@
-"""What the settings of all forms have, in a deployment."""
+"""The common settings of all forms in a deployment."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -33,17 +33,17 @@ class TypedSettings(SpecBase):
 
 
 class ComponentSettings(TypedSettings):
-    """What the settings of each component have: its kind, a registered name or `module:Class`."""
+    """The settings of each component: its kind, a registered name or `module:Class`."""
 
     kind: str
 
 
 class ModifierSettings(ComponentSettings):
-    """What the settings of each modifier have."""
+    """The settings of each modifier."""
 
 
 class SensorSettings(ComponentSettings):
-    """What the settings of each sensor have: how often it measures, and what is done to its readings, in order."""
+    """The settings of each sensor: its rate, and the modifiers of its readings, in order."""
 
     rate_hz: Rate = Field(alias="rate")
     offset_ns: Offset = default("0 s", "offset")
@@ -51,28 +51,27 @@ class SensorSettings(ComponentSettings):
 
 
 class ActuatorSettings(ComponentSettings):
-    """What the settings of each actuator have: what is done to its commands, in order."""
+    """The settings of each actuator: the modifiers of its commands, in order."""
 
     modifiers: list[SerializeAsAny[ModifierSettings]] = Field(default=[], max_length=MODIFIERS_MAX)
 
 
 class EntityRuleSettings(ComponentSettings):
-    """What the settings of each rule of an entity have."""
+    """The settings of each rule of an entity."""
 
 
 class RuleSettings(ComponentSettings):
-    """What the settings of each rule of the world have."""
+    """The settings of each rule of the world."""
 
 
 class SceneSettings(ComponentSettings):
-    """What the settings of each scene have."""
+    """The settings of each scene."""
 
 
 class EntitySettings(TypedSettings):
-    """What the settings of every entity have: its model, a registered name or `module:Class`.
+    """The settings of every entity: its model, a registered name or `module:Class`.
 
-    `tags` are for those who look for entities of a kind, beside the tags of its model. A `spare` is absent until it is
-    added.
+    `tags` are found by components and rules, beside the tags of its model. A `spare` is absent until it is added.
     """
 
     model: str
@@ -86,9 +85,9 @@ class EntitySettings(TypedSettings):
 
 
 class RobotSettings(EntitySettings):
-    """What the settings of every robot have: sensors and actuators by the names of their channels, rules by name.
+    """The settings of every robot: sensors and actuators by the names of their channels, rules by name.
 
-    A robot that says nothing of its actuators, or of its rules, has those of its model.
+    A robot without a setting of its actuators, or of its rules, has those of its model.
     """
 
     sensors: dict[Name, SerializeAsAny[SensorSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
@@ -96,12 +95,12 @@ class RobotSettings(EntitySettings):
     rules: dict[Name, SerializeAsAny[EntityRuleSettings]] = Field(default={}, max_length=COMPONENTS_MAX)
 
     def asset_paths(self, files: Mapping[str, bytes]) -> Sequence[str]:
-        """Return the files that its model is made from, by paths inside the asset folder: those that the settings name,
-        and of those that are in `files`, contents by path, the ones that these name in turn. Raises AssetError."""
+        """Return the files of its model, by paths inside the asset folder: the files that the settings name, and the
+        files that these name in turn, where `files`, contents by path, has them. Raises AssetError."""
         return ()
 
     def check_assets(self, files: Mapping[str, bytes]) -> None:
-        """Raise AssetError for a file that is not acceptable; all that `asset_paths` names are in `files`."""
+        """Raise AssetError for an invalid file; all that `asset_paths` names are in `files`."""
 
 
 BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
@@ -115,4 +114,4 @@ BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
         "model": EntitySettings,
     }
 )
-"""What the settings of a form have in common with all others of it; settings of kits are any."""
+"""The base class of the settings of a form; settings of kits are any."""

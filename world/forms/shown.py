@@ -1,6 +1,6 @@
-"""The messages of Foxglove by which captures show readings: what each needs of a reading and of its sensor's settings.
+"""The Foxglove messages that show readings: the fields that each needs of a reading and of its sensor's settings.
 
-Here they are names; `capture.shown_readings` makes them.
+Here they are names; `capture.shown_readings` builds them.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ POSE: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 @dataclass(frozen=True, slots=True)
 class Needed:
-    """What a message needs: all fields of one of `choices`, a number each, or several where `is_several`; and what the
-    settings have as an attribute."""
+    """The needs of a message: all fields of one of `choices`, a number each, or several where `is_several`; and an
+    attribute of the settings."""
 
     choices: tuple[tuple[str, ...], ...]
     is_several: bool = False

@@ -1,1 +1,1 @@
-"""What things are made of: what their materials do to waves, what their surfaces do to bodies, their triangles."""
+"""Matter of things: radio materials, surfaces in contacts, triangles."""

@@ -1,9 +1,9 @@
-"""What a thing of the world does to radio waves that pass through it: the names of materials, and the schema.
+"""The effect of things on radio waves that pass through them: the names of materials, and the schema.
 
 In a deployment a thing's `radio` is a material's name (`radio: concrete`), a material with the thickness of a shell
 (`{is: glass, thickness: 6 mm}`), a fixed loss (`{loss: 5 dB}`), or `none`. Names are those of Recommendation ITU-R
-P.2040 (effects of building materials and structures on radiowave propagation), table 3; what such a material loses at
-a frequency is the vHub's to compute.
+P.2040 (effects of building materials and structures on radiowave propagation), table 3; the vHub computes the loss of
+such a material at a frequency.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MATERIALS: Final[tuple[MaterialName, ...]] = (
     "metal",
 )
 NONE: Final = "none"
-"""In place of a material: waves pass as if nothing was there."""
+"""In place of a material: waves pass without loss."""
 
 Loss = Annotated[float, Quantity(units.LEVEL, "0 dB", "200 dB")]
 
@@ -47,12 +47,12 @@ class RadioMaterial(SpecBase):
 
     @property
     def needs_chord(self) -> bool:
-        """True if what is lost depends on the way through the thing: it is neither a shell nor a fixed loss."""
+        """Whether the loss depends on the way through the thing: it is neither a shell nor a fixed loss."""
         return self.loss_db is None and self.thickness_m is None
 
 
 def _from_text(value: object) -> object:
-    """A material's name, or `none`, as the mapping that it stands for."""
+    """A material's name, or `none`, as the mapping that it abbreviates."""
     if not isinstance(value, str):
         return value
     if value == NONE:
@@ -73,9 +73,9 @@ def _material(**keys: Any) -> RadioMaterial:
 
 
 UNKNOWN: Final = _material(loss="5 dB")
-"""A body of which nothing is known: the loss of an internal wall in ns-3 (`InternalWallLoss`, building models)."""
+"""A body of unknown material: the loss of an internal wall in ns-3 (`InternalWallLoss`, building models)."""
 OPEN: Final = _material(loss="0 dB")
-"""What waves pass as if it were not there."""
+"""A thing that waves pass without loss."""
 CONCRETE: Final = _material(**{"is": "concrete"})
 METAL: Final = _material(**{"is": "metal"})
 WOOD: Final = _material(**{"is": "wood"})

@@ -20,14 +20,14 @@ MESH_SUFFIXES: Final = (".obj", ".stl")
 
 
 class AssetError(Refused):
-    """A file that a deployment refers to is not acceptable: `file:line: what, value`."""
+    """A file that a deployment refers to is invalid: `file:line: what, value`."""
 
     exit_code = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """Triangles: corners as indices (m, 3) into vertices (n, 3), in m in the frame of what it belongs to.
+    """Triangles: corners as indices (m, 3) into vertices (n, 3), in m in the frame of the link or thing.
 
     Two meshes are equal when their digests, BLAKE2b of both arrays, are.
     """
@@ -44,12 +44,12 @@ class Mesh:
 
 
 def digest_of(content: bytes) -> str:
-    """Return what names a file's content: 32 bytes of BLAKE2b in hex."""
+    """Return the digest of a file's content: 32 bytes of BLAKE2b in hex."""
     return blake2b(content, digest_size=32).hexdigest()
 
 
 def check_digest(name: str, content: bytes, digest: str) -> None:
-    """Refuse a file that is not the one that was meant."""
+    """Refuse a file with another digest than the expected one."""
     found = digest_of(content)
     if found != digest:
         raise AssetError(f"{name}: {describe('another file than the digest names', found)}, expected {show(digest)}")

@@ -1,4 +1,4 @@
-"""What the rigid bodies of a world feel: gravity, and what free bodies feel of each surface."""
+"""The physics of rigid bodies: gravity, contacts of surfaces, and settings of the solver."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """What a surface brings to its contacts: restitution and friction of a pair are the products of both sides'.
+    """A side of contacts: restitution and friction of a pair are the products of both sides'.
 
     Rolling friction (a length, m) of a pair is each side's own times the other's friction, added. Contacts with a
     `silent` surface are not in the contact logs.
@@ -40,11 +40,11 @@ class Side:
 
 @dataclass(frozen=True, slots=True)
 class Physics:
-    """What rigid bodies feel: gravity (m/s2), the sides of surfaces by their names, the solver's iterations and error
-    reduction of contacts (`contact_erp`).
+    """The physics of rigid bodies: gravity (m/s2), the sides of surfaces by their names, the solver's iterations and
+    error reduction of contacts (`contact_erp`).
 
-    `surfaces` and `between_free` are for engines of spheres alone: what a free body feels of each surface, and of
-    another free body. `density` (kg/m3) and `viscosity` (Pa s) are those of what bodies are in, 0 of nothing.
+    `surfaces` and `between_free` are for engines of spheres alone: the pairs of a free body with each surface, and with
+    another free body. `density` (kg/m3) and `viscosity` (Pa s) are those of the medium, 0 without one.
     """
 
     gravity: float
@@ -61,7 +61,7 @@ RollingLength = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
 
 
 class SurfaceSettings(SpecBase):
-    """What a surface brings to its contacts: `friction` and `restitution` of a pair are the products of both sides'.
+    """A surface in contacts: `friction` and `restitution` of a pair are the products of both sides'.
 
     `rolling_friction` is a length: the moment that brakes a body that rolls is this times the normal force, times the
     other side's friction.
@@ -73,8 +73,8 @@ class SurfaceSettings(SpecBase):
 
 
 class PhysicsSettings(SpecBase):
-    """What all rigid bodies of a world feel: gravity (standard gravity by default, ISO 80000-3), and how often the
-    solver iterates at most over the contacts and joints of a substep: a solve that is cut short may throw bodies about.
+    """The physics of all rigid bodies of a world: gravity (standard gravity by default, ISO 80000-3), and the greatest
+    count of iterations over the contacts and joints of a substep: a solve that is cut short may throw bodies about.
     `contact_erp` is the share of an overlap that a substep corrects.
     """
 
@@ -85,13 +85,13 @@ class PhysicsSettings(SpecBase):
 
 DEFAULT: Final = "default"
 FRICTIONLESS: Final = "frictionless"
-"""The surface of what rolls or slides freely: of balls in casters."""
+"""The surface of parts that roll or slide freely: of balls in casters."""
 BASIC: Final = ("default", "floor", "walls", FRICTIONLESS)
 """Surfaces that each world has; those of these names in a deployment replace them."""
 
 
 def physics_from(settings: PhysicsSettings | None, surfaces: Mapping[str, SurfaceSettings]) -> Physics:
-    """Return what rigid bodies feel in a world without a kit that says it."""
+    """Return the physics of rigid bodies in a world without a kit that defines it."""
     felt = PhysicsSettings.model_validate({}) if settings is None else settings
     plain, smooth = SurfaceSettings.model_validate({}), SurfaceSettings.model_validate({"friction": 0})
     known = {name: smooth if name == FRICTIONLESS else plain for name in BASIC} | dict(surfaces)

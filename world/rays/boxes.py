@@ -1,4 +1,4 @@
-"""Boxes along the world's axes around things: which of them a line meets. They only say where to look."""
+"""Axis-aligned boxes around things, and the boxes that a line meets: candidates for an exact look."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from foosim.world.scene import Vector
 Floats: TypeAlias = NDArray[np.float64]
 
 MARGIN_M: Final = 1e-6
-"""How much larger boxes are made that only say where to look: far more than rounding, far less than anything."""
+"""The margin of boxes of candidates (m): far more than rounding, far less than any thing."""
 STEP_MIN: Final = 1e-30
-"""A direction's part below this is taken for this much where boxes only say where to look: no division overflows."""
+"""The least part of a direction for boxes of candidates: no division overflows."""
 
 
 def boxes_around(
@@ -31,7 +31,7 @@ def boxes_around(
 def boxes_met_by(boxes: Floats, line: tuple[Vector, Vector]) -> list[int]:
     """Return the boxes (2, 3, m) that a line meets.
 
-    It only says where to look: a box that a line misses by no more than a margin may be among them.
+    These are candidates: a box that a line misses by up to a margin may be among them.
     """
     first, last = between_sides(boxes, *as_columns(line[0], [b - a for a, b in zip(*line, strict=True)]))
     met: list[int] = (np.maximum(first, -MARGIN_M) <= np.minimum(last, 1.0 + MARGIN_M)).nonzero()[0].tolist()
@@ -39,13 +39,13 @@ def boxes_met_by(boxes: Floats, line: tuple[Vector, Vector]) -> list[int]:
 
 
 def as_columns(start: Vector, way: Sequence[float]) -> tuple[Floats, Floats]:
-    """Return a start and a way as columns, the way without a part so small that a division by it overflows."""
+    """Return a start and a way as columns, with parts of the way large enough to divide by."""
     steps = [STEP_MIN if abs(part) < STEP_MIN else part for part in way]
     return np.array(start)[:, None], np.array(steps)[:, None]
 
 
 def between_sides(boxes: Floats, start: Floats, step: Floats) -> tuple[Floats, Floats]:
-    """Return between which multiples of `step` from `start` (columns) a line is in each box (2, 3, m)."""
+    """Return the span of each box (2, 3, m) on a line, as multiples of `step` from `start` (columns)."""
     sides = (boxes - start) / step
     first = np.maximum.reduce(np.minimum(sides[0], sides[1]))
     last = np.minimum.reduce(np.maximum(sides[0], sides[1]))

@@ -1,8 +1,8 @@
-"""The ray caster of a scene: scenery and what else stands is prepared once, what moves is placed for each frame.
+"""The ray caster of a scene: fixed shapes are prepared once, moving ones are placed for each frame.
 
 Rays and distances are of the shapes of all bodies and of the scenery. A free body whose links do not move about one
 another is placed with all others like it at once; the links of any other by the one forward kinematics. A caster keeps
-what follows from scene and layout, and the places of the newest frame, found again by the bits of all that move.
+data of scene and layout, and the places of the newest frame, found again by the bits of all moving poses.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from foosim.world.rays.sorted_boxes import FEW, SortedBoxes
 from foosim.world.scene import ORIGIN, UPRIGHT, Body, Link, Pose, Scene, Vector, moved, multiply, rotate, shape_box
 
 Ignoring: TypeAlias = NDArray[np.int64] | int | None
-"""The index of the entity that is passed, one for all or one for each; -1 or None for none."""
-NOBODY: Final = -2
-"""The number of no thing, not even of that which is in place of none."""
+"""The index of the entity that rays pass, one for all or one for each; -1 or None without one."""
+PASSES_NONE: Final = -2
+"""In place of the number of a passed thing; `NOTHING` would be that of a missing hit."""
 
 
 class Caster:
     """Rays in the frames of one layout.
 
-    `things` are the names of what can be met: those of entities by their index in the layout, then the scenery's.
+    `things` are the names of all that rays can meet: of entities by their index in the layout, then of scenery.
     """
 
     def __init__(self, scene: Scene, layout: Layout) -> None:
         scenery = list(dict.fromkeys(shape.name for shape in scene.scenery))
         self.things = (*layout.names, *scenery)
         number = {name: len(layout.entities) + place for place, name in enumerate(scenery)}
-        standing: list[Part] = []
+        fixed: list[Part] = []
         moving: list[Part] = []
         self._free: list[tuple[Entity, Link]] = []
         self._jointed: list[tuple[Entity, Body]] = []
@@ -54,7 +54,7 @@ class Caster:
                 frame, parts = len(self._free), moving
                 self._free.append((entity, body.links[0]))
             else:
-                frame, parts = 0, standing
+                frame, parts = 0, fixed
             parts += _parts(body, entity, [frame] * len(poses), poses)
         frames = len(self._free)
         for entity, body in bodies:
@@ -63,20 +63,20 @@ class Caster:
                 numbers = list(range(frames, frames + len(body.links)))
                 moving += _parts(body, entity, numbers, [("", ORIGIN, UPRIGHT)] * len(numbers))
                 frames += len(body.links)
-        standing += [(shape, number[shape.name], 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
-        self._forms, self._moving = Forms([*standing, *moving], meshes), slice(len(standing), None)
+        fixed += [(shape, number[shape.name], 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
+        self._forms, self._moving = Forms([*fixed, *moving], meshes), slice(len(fixed), None)
         self._prepare_frames()
         still = np.array([ORIGIN]).T, np.array([UPRIGHT]).T
-        self._standing = Poses(self._forms, slice(len(standing)), *still).columns
-        boxes = np.array([_box_of(part) for part in standing]).reshape(-1, 2, 3).transpose(1, 2, 0)
+        self._fixed = Poses(self._forms, slice(len(fixed)), *still).columns
+        boxes = np.array([_box_of(part) for part in fixed]).reshape(-1, 2, 3).transpose(1, 2, 0)
         self._boxes = boxes[0] - MARGIN_M, boxes[1] + MARGIN_M
         self._near = SortedBoxes(*self._boxes)
-        self._is_small = len(standing) + len(moving) <= FEW
+        self._is_small = len(fixed) + len(moving) <= FEW
         self._key: bytes | None = None
-        self._placement = Placement(Placed(self._forms, self._standing, [self._near]))
+        self._placement = Placement(Placed(self._forms, self._fixed, [self._near]))
 
     def _prepare_frames(self) -> None:
-        """Note where a frame has the poses of what moves."""
+        """Note the places of moving poses in a frame."""
         at = [entity.offsets for entity, _ in self._free]
         places = [offsets[name] for name in ("position", "orientation") for offsets in at]
         counts = [3] * len(at) + [4] * len(at)
@@ -103,7 +103,7 @@ class Caster:
         return self._placement
 
     def _place(self, state: Floats, numbers: Sequence[float]) -> Placed:
-        """Return all shapes where they are in a frame, of whose numbers `state` are those of the poses."""
+        """Return all shapes placed in a frame, of whose numbers `state` are those of the poses."""
         free = len(self._free)
         positions = state[: 3 * free].reshape(-1, 3).T
         orientations = multiplied(state[3 * free : 7 * free].reshape(-1, 4).T, self._back)
@@ -113,10 +113,10 @@ class Caster:
             positions = np.concatenate((positions, np.array([position for _, position, _ in poses]).T), axis=1)
             orientations = np.concatenate((orientations, np.array([turned for _, _, turned in poses]).T), axis=1)
         moving = Poses(self._forms, self._moving, positions, orientations)
-        return Placed(self._forms, np.concatenate((self._standing, moving.columns), axis=1), self._boxes_with(moving))
+        return Placed(self._forms, np.concatenate((self._fixed, moving.columns), axis=1), self._boxes_with(moving))
 
     def _boxes_with(self, moving: Poses) -> list[SortedBoxes]:
-        """Return the boxes around all shapes: those around what stands are sorted once, where they are many."""
+        """Return the boxes around all shapes: those of fixed shapes are sorted once, where they are many."""
         boxes = moving.boxes()
         if not self._is_small:
             return [self._near, SortedBoxes(*boxes)]
@@ -125,17 +125,17 @@ class Caster:
 
 
 class Placement:
-    """All things where they are in one frame."""
+    """All things placed in one frame."""
 
     def __init__(self, placed: Placed) -> None:
         self._placed = placed
 
     def cast(self, origins: Floats, directions: Floats, ranges: Floats | float, ignoring: Ignoring = None) -> Hits:
-        """Return what rays meet first: distances (n,) and the numbers of things (n,), inf and -1 where that is nothing.
+        """Return the first hits of rays: distances (n,) and the numbers of things (n,), inf and -1 without a hit.
 
-        `origins` and unit `directions` (n, 3) are in the world frame (m), `ranges` (n,) are how far rays go (m); a ray
-        passes the entity `ignoring`. One that begins inside of something meets it at 0; one that touches something does
-        not meet it. Each has the same bits alone and in any company or order.
+        `origins` and unit `directions` (n, 3) are in the world frame (m), `ranges` (n,) are their lengths (m); a ray
+        passes the entity `ignoring`. One that begins inside of a thing meets it at 0, one that touches a thing does not
+        meet it. Each has the same bits alone and among others in any order.
         """
         count = len(origins)
         starts, ways = (
@@ -147,16 +147,16 @@ class Placement:
     def fans(self, origins: Floats, ways: Floats, ranges: Floats, passing: NDArray[np.int64]) -> Floats:
         """Return the distances (f, r) that `cast` gives of f fans of r rays that begin at one place.
 
-        `origins` (3, f) and unit `ways` (3, f, r) are in the world frame (m), `ranges` (f,) are how far the rays of a
-        fan go (m), `passing` (f,) the index of the entity that they pass.
+        `origins` (3, f) and unit `ways` (3, f, r) are in the world frame (m), `ranges` (f,) are the lengths of a fan's
+        rays (m), `passing` (f,) the index of the entity that they pass.
         """
         return distances(self._placed, Bundles.of_fans(origins, ways, ranges, passing)).reshape(ways.shape[1:])
 
     def clearance(self, points: Floats, reach: Floats | float, ignoring: Ignoring = None) -> Floats:
-        """Return how far points (n, 3) are from the nearest surface (m): negative inside, inf beyond `reach`.
+        """Return the distances of points (n, 3) from the nearest surface (m): negative inside, inf beyond `reach`.
 
-        All is in the world frame; the entity `ignoring` does not count. A mesh that is not closed has no inside.
-        Each has the same bits alone and in any company or order.
+        All is in the world frame; the entity `ignoring` does not count. An open mesh has no inside.
+        Each has the same bits alone and among others in any order.
         """
         count = len(points)
         places = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3).T)
@@ -165,13 +165,13 @@ class Placement:
 
 
 def _passed(ignoring: Ignoring, count: int) -> NDArray[np.int64]:
-    """Return the number of the thing that is passed, of each: one that no thing has, where that is none."""
+    """Return the number of the thing that each passes; PASSES_NONE for none."""
     given = np.broadcast_to(np.asarray(NOTHING if ignoring is None else ignoring, np.int64), count)
-    return np.where(given < 0, NOBODY, given)
+    return np.where(given < 0, PASSES_NONE, given)
 
 
 def _poses_about_base(body: Body, entity: Entity) -> list[Pose]:
-    """Return where the links of a body without moving joints are: in the world, or of a free one about its first."""
+    """Return the poses of a body's links, without moving joints: in the world, or of a free one about its first."""
     if body.is_free:
         first = replace(body.links[0], joint="fixed", position=ORIGIN, orientation=UPRIGHT)
         body = replace(body, position=ORIGIN, orientation=UPRIGHT, links=(first, *body.links[1:]))
@@ -179,7 +179,7 @@ def _poses_about_base(body: Body, entity: Entity) -> list[Pose]:
 
 
 def _box_of(part: Part) -> tuple[Vector, Vector]:
-    """Return the least and the greatest coordinates of a shape that stands."""
+    """Return the least and the greatest coordinates of a fixed shape."""
     shape, _, _, position, orientation = part
     turned = multiply(orientation, shape.orientation)
     return shape_box(

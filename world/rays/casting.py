@@ -1,8 +1,8 @@
-"""Rays against placed shapes: what each meets first. Each ray has the bits that it has alone.
+"""The first hits of rays on placed shapes. Each ray has the bits that it has alone.
 
-Rays that begin at one place are a bundle, as those of a scanner are. A box around a bundle says which shapes may be
-met, the sphere around each of these which ray comes near; only what is near is computed exactly. Neither changes a
-distance, of which the least is taken.
+Rays that begin at one place are a bundle, as those of a scanner. A box around a bundle selects shapes, the sphere
+around each of these selects rays; only near pairs are computed exactly. Neither changes a distance, of which the least
+is taken.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from foosim.world.rays.triangles import Triangles
 
 Indices = NDArray[np.intp]
 BUNDLE: Final = 32
-"""Rays of a bundle at most: fewer of a fan go in a direction of their own, to which fewer shapes are near."""
+"""The greatest count of rays of a bundle: a narrower bundle has fewer near shapes."""
 ROUNDING: Final = 1.000001
-"""A square of a distance that is within a reach is no more than that of the reach, but for rounding."""
+"""A tolerance of rounding in comparisons of squares of distances."""
 PAIRS_AT_ONCE: Final = 16_384
-"""So many pairs of a ray and a shape are compared at once: what is computed stays in a cache."""
+"""The count of pairs of a ray and a shape that are compared at once: their arrays stay in a cache."""
 
 
 class Hits(NamedTuple):
-    """What rays meet first: how far away (m), inf where that is nothing, and the number of the thing, else -1."""
+    """The first hits of rays: distance (m) and number of the thing; inf and -1 without a hit."""
 
     distances: Floats
     things: NDArray[np.int64]
 
 
 class Bundles(NamedTuple):
-    """n rays in b bundles: those of a bundle begin at one place, go as far, pass the same thing and are in a row."""
+    """n rays in b bundles: those of a bundle have one start, one length and one passed thing, and are in a row."""
 
     origins: Floats
     """Of bundles (3, b)."""
     ranges: Floats
-    """How far rays go (b,) (m)."""
+    """The lengths of rays (b,) (m)."""
     passing: NDArray[np.int64]
     """The numbers of the things that they pass (b,)."""
     starts: Indices
     """The first ray of each bundle (b,)."""
     lengths: Indices
-    """How many rays each has (b,)."""
+    """The count of rays of each (b,)."""
     ways: Floats
     """Unit directions of rays (3, n)."""
 
@@ -83,7 +83,7 @@ class Bundles(NamedTuple):
 
 
 def _in_pieces(begins: Indices, lengths: Indices) -> tuple[Indices, Indices]:
-    """Return where pieces of at most BUNDLE begin, and how long they are, of runs of rays."""
+    """Return the starts and lengths of pieces of at most BUNDLE rays, of runs of rays."""
     if not len(lengths) or int(lengths.max()) <= BUNDLE:
         return begins, lengths
     pieces = -(-lengths // BUNDLE)
@@ -105,7 +105,7 @@ class Pairs(NamedTuple):
 
 
 def distances(placed: Placed, bundles: Bundles) -> Floats:
-    """Return how far away it is what rays meet first (n,) (m); inf where that is nothing."""
+    """Return the distances of the first hits of rays (n,) (m); inf without a hit."""
     least = np.full(bundles.ways.shape[1], np.inf)
     for pairs in _near(placed, bundles):
         np.minimum.at(least, pairs.rays, _entries(placed, bundles, pairs))
@@ -113,10 +113,10 @@ def distances(placed: Placed, bundles: Bundles) -> Floats:
 
 
 def cast(placed: Placed, bundles: Bundles) -> Hits:
-    """Return what rays meet first of placed shapes; of things at the same distance that of the first shape.
+    """Return the first hits of rays on placed shapes; of things at the same distance that of the first shape.
 
-    A ray that begins inside of something meets it at once. One that touches something, or is in it for no more than
-    TOUCH_M, does not meet it.
+    A ray that begins inside of a thing meets it at once. One that touches a thing, or is in it for at most TOUCH_M,
+    does not meet it.
     """
     count = bundles.ways.shape[1]
     hits = Hits(np.full(count, np.inf), np.full(count, NOTHING, np.int64))
@@ -124,13 +124,13 @@ def cast(placed: Placed, bundles: Bundles) -> Hits:
         entries, before = _entries(placed, bundles, pairs), hits.distances[pairs.rays]
         np.minimum.at(hits.distances, pairs.rays, entries)
         nearest = np.flatnonzero((entries < before) & (entries == hits.distances[pairs.rays]))[::-1]
-        # Shapes of a ray are in their order: what is written last is the first of them.
+        # Shapes of a ray are in their order: the last written one is the first of them.
         hits.things[pairs.rays[nearest]] = placed.things[pairs.shapes[nearest]]
     return hits
 
 
 def _near(placed: Placed, bundles: Bundles) -> Iterator[Pairs]:
-    """Yield rays and shapes that they come near to: those of a ray in the order of shapes."""
+    """Yield rays and the shapes near to them: those of a ray in the order of shapes."""
     bundle, shapes = placed.met(*bundles.box())
     kept = placed.things[shapes] != bundles.passing[bundle]
     if not kept.all():
@@ -149,7 +149,7 @@ def _near(placed: Placed, bundles: Bundles) -> Iterator[Pairs]:
 
 
 def _passing_near(placed: Placed, bundles: Bundles, bundle: Indices, shapes: Indices, length: int) -> Pairs:
-    """Return which rays of bundles, of this length, meet the spheres around shapes, or nearly so."""
+    """Return the rays of bundles, of this length, that meet the spheres around shapes, or nearly so."""
     origins, ranges, radii = bundles.origins[:, bundle], bundles.ranges[bundle], placed.radii[shapes]
     x, y, z = placed.middles[:, shapes] - origins
     square = x * x + y * y + z * z
@@ -177,7 +177,7 @@ def _passing_near(placed: Placed, bundles: Bundles, bundle: Indices, shapes: Ind
 
 
 def _entries(placed: Placed, bundles: Bundles, pairs: Pairs) -> Floats:
-    """Return where rays enter shapes, pair by pair (m); inf where they do not."""
+    """Return the distances at which rays enter shapes, pair by pair (m); inf without a hit."""
     forms, count = placed.forms, len(pairs.rays)
     kinds = forms.forms[pairs.shapes]
     ways = placed.local(pairs.shapes, bundles.ways[:, pairs.rays])
@@ -207,13 +207,13 @@ def _entries(placed: Placed, bundles: Bundles, pairs: Pairs) -> Floats:
 
 
 def _within(enter: Floats, leave: Floats, ranges: Floats) -> Floats:
-    """Return where spans begin that a ray has from its start to its range; inf where they are no more than a touch."""
+    """Return the starts of spans between a ray's start and its range; inf for a touch."""
     enter = np.where(enter > 0.0, enter, 0.0)
     return np.where(np.minimum(leave, ranges) - enter > TOUCH_M, enter, np.inf)
 
 
 def _into_mesh(triangles: Triangles, starts: Floats, ways: Floats, ranges: Floats) -> Floats:
-    """Return where rays meet a mesh: where they enter it, or pass a wall of one that is not closed."""
+    """Return the distances at which rays enter a mesh, or pass a wall of an open one."""
     entries = np.full(len(ranges), np.inf)
     lines, places = triangles.hits_of_many(starts, ways)
     if triangles.is_closed:

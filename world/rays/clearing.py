@@ -1,4 +1,4 @@
-"""How far places are from placed shapes, negative inside. Each place has the bits that it has alone.
+"""Distances of places from placed shapes, negative inside. Each place has the bits that it has alone.
 
 Distances are element-wise, of places (3, n) in the frames of shapes with sizes (n,) or (3, n).
 Sources: distance functions of solids, Hart, "Sphere tracing" (The Visual Computer, 1996); the place of a triangle that
@@ -22,25 +22,24 @@ from foosim.world.scene import Box, Cylinder, Geometry, Hull, Sphere, Vector
 
 PLACES_AT_ONCE: Final = 64
 BLOCKS_AT_ONCE: Final = 32
-"""So many places are compared with so many blocks of triangles at once."""
+"""The counts of places and of blocks of triangles that are compared at once."""
 MESHES_KEPT: Final = 64
-"""Meshes whose triangles are kept in order, those that were asked for last."""
+"""The count of latest meshes whose triangles are kept in order."""
 
 
 def clear_of(placed: Placed, places: Floats, reach: Floats, passing: NDArray[np.int64]) -> Floats:
-    """Return how far places (3, n) are from the nearest surface (m), negative inside; inf beyond their reach (n,).
+    """Return the distances of places (3, n) from the nearest surface (m), negative inside; inf beyond reach (n,).
 
-    Inside of several shapes it is the depth in that in which it is deepest. Those of the thing `passing` (n,) do not
-    count.
+    Inside of several shapes it is the greatest depth. Shapes of the thing `passing` (n,) do not count.
     """
     found = np.full(places.shape[1], np.inf)
-    asked, shapes = placed.met(places - reach - MARGIN_M, places + reach + MARGIN_M)
-    kept = placed.things[shapes] != passing[asked]
-    asked, shapes = asked[kept], shapes[kept]
+    queries, shapes = placed.met(places - reach - MARGIN_M, places + reach + MARGIN_M)
+    kept = placed.things[shapes] != passing[queries]
+    queries, shapes = queries[kept], shapes[kept]
     forms = placed.forms
     kinds = forms.forms[shapes]
-    local = places[:, asked] - placed.positions[:, shapes]
-    distances = np.full(len(asked), np.inf)
+    local = places[:, queries] - placed.positions[:, shapes]
+    distances = np.full(len(queries), np.inf)
     for form in forms.primitives:
         some = np.flatnonzero(kinds == form)
         if len(some):
@@ -50,7 +49,7 @@ def clear_of(placed: Placed, places: Floats, reach: Floats, passing: NDArray[np.
         some = np.flatnonzero(having[shapes])
         if len(some):
             distances[some] = _to_triangles(placed.local(shapes[some], local[:, some]), triangles)
-    np.minimum.at(found, asked, distances)
+    np.minimum.at(found, queries, distances)
     return np.where(found <= reach, found, np.inf)
 
 
@@ -65,7 +64,7 @@ def _distances(form: int, places: Floats, half: Floats) -> Floats:
 
 
 def distance_to(geometry: Geometry, place: Vector) -> float:
-    """Return how far a place in the frame of a geometry is from its surface (m), negative inside."""
+    """Return the distance of a place in the frame of a geometry from its surface (m), negative inside."""
     column = np.array(place).reshape(3, 1)
     if isinstance(geometry, Box):
         found = _to_boxes(column, np.array(geometry.half).reshape(3, 1))
@@ -128,7 +127,7 @@ def _to_triangles(places: Floats, triangles: Triangles) -> Floats:
 
 
 def _outside_or_deep(beyond: list[Floats]) -> Floats:
-    """Return the distance of places that are so far beyond pairs of sides that are square to each other."""
+    """Return the distance of places from their distances beyond pairs of sides at right angles."""
     square, deepest = np.zeros_like(beyond[0]), beyond[0]
     for one in beyond:
         out = np.maximum(one, 0.0)

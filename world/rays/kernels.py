@@ -1,6 +1,6 @@
-"""Where many straight lines are inside of boxes, spheres, cylinders and capsules, each in the frame of its shape.
+"""Spans of many straight lines inside of boxes, spheres, cylinders and capsules, each in the frame of its shape.
 
-These are the functions of `spans` for arrays: each number has the bits that those give, in whatever company. Starts and
+These are the functions of `spans` for arrays, with the same bits. Starts and
 unit ways have the shape (3, n), sizes (n,) or (3, n). A span that is empty has its end before its beginning.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from foosim.world.rays.boxes import Floats
 
 Spans = tuple[Floats, Floats]
-"""Where lines enter something and where they leave it (m); inf and -inf where one misses it."""
+"""The places at which lines enter and leave a shape (m); inf and -inf for a miss."""
 
 
 def box_spans(starts: Floats, ways: Floats, half: Floats) -> Spans:

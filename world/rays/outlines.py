@@ -1,7 +1,7 @@
-"""Clearance of discs that stay on a floor: shapes as they are seen from above, one test at a time.
+"""Clearance of discs on a floor: shapes seen from above, one test at a time.
 
-An upright box is a rectangle; a sphere, an upright cylinder and an upright capsule are circles; whatever is tilted, a
-hull and a mesh are the rectangle around them. Only + - * / and comparisons decide what is free. Neighbour: `clearing`,
+An upright box is a rectangle; a sphere, an upright cylinder and an upright capsule are circles; tilted shapes,
+hulls and meshes are the rectangles around them. Only + - * / and comparisons decide. Neighbour: `clearing`,
 for many places among shapes as they are in space.
 """
 
@@ -53,7 +53,7 @@ Outline = Rectangle | Circle
 
 
 def outline(shape: Shape) -> Outline:
-    """Return a shape in the world as it is seen from above."""
+    """Return a shape in the world as seen from above."""
     x, y, _ = shape.position
     is_upright = shape.orientation[0] == 0.0 and shape.orientation[1] == 0.0
     geometry = shape.geometry

@@ -1,4 +1,4 @@
-"""Shapes of a world as arrays, for many rays at once: what they are, where they are, and what is around them."""
+"""Shapes of a world as arrays, for many rays at once: their forms, poses, and spheres around them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ that frame."""
 
 
 class Forms:
-    """What m shapes are, and how they are fixed to frames. Of shapes at equal distances the first is met."""
+    """The forms of m shapes, and their poses in frames. Of shapes at equal distances the first is met."""
 
     def __init__(self, parts: Sequence[Part], meshes: Meshes) -> None:
         count = len(parts)
@@ -39,7 +39,7 @@ class Forms:
         """Of the sphere around each, in its own frame, whose radius is in `radii`."""
         self.radii = np.zeros(count)
         self.meshes: list[tuple[Triangles, NDArray[np.bool_]]] = []
-        """Each mesh, and which shapes have it."""
+        """Each mesh, and the shapes with it."""
         having: dict[int, tuple[Triangles, NDArray[np.bool_]]] = {}
         for number, (shape, _, _, position, orientation) in enumerate(parts):
             form, half = form_of(shape.geometry)
@@ -53,7 +53,7 @@ class Forms:
                 mesh[1][number] = True
         self.meshes = list(having.values())
         self.primitives = sorted({*self.forms.tolist()} - {MESH})
-        """The forms that there are, meshes aside."""
+        """The forms of the shapes, meshes aside."""
 
 
 def _ball_around(shape: Shape, form: int, half: Vector) -> tuple[Vector, float]:
@@ -74,7 +74,7 @@ def _ball_around(shape: Shape, form: int, half: Vector) -> tuple[Vector, float]:
 
 
 class Poses:
-    """Where some shapes in a row are in the world; columns are those of the shapes."""
+    """The poses of some shapes in a row in the world; columns are those of the shapes."""
 
     def __init__(self, forms: Forms, part: slice, positions: Floats, orientations: Floats) -> None:
         """`positions` (3, k) and `orientations` (4, k) are those of the frames of these shapes, by number."""
@@ -92,7 +92,7 @@ class Poses:
 
 
 class Placed:
-    """Shapes where they are in the world."""
+    """Shapes placed in the world."""
 
     def __init__(self, forms: Forms, columns: Floats, near: Sequence[SortedBoxes]) -> None:
         """`columns` are those of `Poses`, of all shapes; `near` are the boxes around them, with a margin, in a row."""
@@ -103,7 +103,7 @@ class Placed:
         self._back, self._near = columns[6:], near
 
     def met(self, low: Floats, high: Floats) -> tuple[Indices, Indices]:
-        """Return which of some boxes (3, n) come near which shapes: pairs in the order of the former, then shapes."""
+        """Return pairs of some boxes (3, n) and the shapes near them, in the order of boxes, then shapes."""
         return met_among(self._near, low, high)
 
     def local(self, chosen: Indices, vectors: Floats) -> Floats:

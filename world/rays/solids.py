@@ -1,4 +1,4 @@
-"""Shapes as rays meet them: a shape at a pose, where a line is inside of it, and which of these places are one."""
+"""Shapes as rays meet them: a shape at a pose, the spans of a line inside of it, and the union of spans."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from foosim.world.scene import (
 )
 
 TOUCH_M: Final = 1e-9
-"""A way through something that is no longer than this is a touch; shapes of one thing this close are one."""
+"""The longest way through a shape that is a touch (m); shapes of one thing this close are one."""
 BOX: Final = 0
 CYLINDER: Final = 1
 SPHERE: Final = 2
@@ -36,7 +36,7 @@ CAPSULE: Final = 4
 Line = tuple[Vector, Vector]
 """Two ends in the world frame (m)."""
 Piece = list[Span]
-"""Where a line is inside of something that counts as one, in order."""
+"""The spans of a line inside of a thing, in order."""
 Ray = tuple[Vector, Vector, float]
 """A line from its lesser end: start, unit direction, length."""
 
@@ -68,13 +68,13 @@ def form_of(geometry: Geometry) -> tuple[int, Vector]:
 
 
 class Meshes:
-    """Meshes as rays meet them, those of equal ones once."""
+    """Meshes as rays meet them, equal ones once."""
 
     def __init__(self) -> None:
         self._known: dict[bytes, Triangles] = {}
 
     def triangles_of(self, geometry: Geometry) -> Triangles | None:
-        """Return the triangles of a mesh or of a convex hull, None of what has none."""
+        """Return the triangles of a mesh or of a convex hull, None of other shapes."""
         mesh = geometry.mesh if isinstance(geometry, Hull) else geometry
         if not isinstance(mesh, Mesh):
             return None
@@ -112,7 +112,7 @@ class Solid:
         return Solid(self._form, self._half, self.triangles, self.group, place, turned)
 
     def pieces(self, ray: Ray) -> list[Piece]:
-        """Return where a ray is inside of it; of a mesh that is not closed, each wall that it passes is a piece."""
+        """Return the spans of a ray inside of it; of an open mesh, each wall that the ray passes is a span."""
         (x, y, z), way, length = ray
         px, py, pz = self._position
         start = (x - px, y - py, z - pz)
@@ -158,7 +158,7 @@ def _within(span: Span, length: float) -> Span | None:
 
 
 def joined(pieces: Iterable[Piece]) -> list[Piece]:
-    """Return pieces that do not overlap: those that do, or touch, as one."""
+    """Return separate pieces: overlapping or touching ones are united."""
     joined: list[Piece] = []
     end = 0.0
     for piece in sorted(pieces):
@@ -171,7 +171,7 @@ def joined(pieces: Iterable[Piece]) -> list[Piece]:
 
 
 def _united(spans: Iterable[Span]) -> Piece:
-    """Return spans that cover the same and do not overlap."""
+    """Return separate spans that cover the same places."""
     united: list[Span] = []
     for enter, leave in sorted(spans):
         if united and enter <= united[-1][1]:

@@ -1,7 +1,7 @@
-"""Boxes along the world's axes, sorted: to find those near a place costs what is near, not how many there are.
+"""Axis-aligned boxes, sorted: a query costs the count of near boxes instead of the count of all.
 
-Boxes of like size are a class, in the order of their least coordinate along the axis on which they are spread most: of
-each class those whose beginning is no more than its greatest size before a question's are compared.
+Boxes of like size are a class, in the order of their least coordinate along the axis on which they are spread most. A
+query compares the boxes of each class that begin at most its greatest size before the query.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ Indices: TypeAlias = NDArray[np.intp]
 Boxes: TypeAlias = tuple[Floats, Floats]
 """Their least and greatest coordinates (3, m)."""
 FEW: Final = 256
-"""So many boxes at most are compared one and all: it costs less than sorting."""
+"""The greatest count of boxes that are all compared: it costs less than sorting."""
 GROWTH_BITS: Final = 2
-"""A class has boxes that differ by less than 2 to this power in size."""
+"""The ratio of sizes in a class is below 2 to this power."""
 
 
 class _Class:
-    """Boxes of like size: where they begin along the axis, in order, which they are, and the greatest size."""
+    """Boxes of like size: their starts along the axis, in order, their numbers, and the greatest size."""
 
     def __init__(self, begins: Floats, members: Indices, size: float) -> None:
         order = np.argsort(begins[members], kind="stable")
@@ -51,40 +51,40 @@ class SortedBoxes:
             self._classes.append(_Class(begins, members, float(sizes[members].max())))
 
     def met(self, low: Floats, high: Floats) -> tuple[Indices, Indices]:
-        """Return which of some boxes (3, n) overlap which of these: pairs in the order of the former, then these."""
+        """Return overlapping pairs of given boxes (3, n) and these, in the order of the given ones, then these."""
         if not self._classes:
             overlap = self._low[:, None, :] <= high[:, :, None]
             overlap &= self._high[:, None, :] >= low[:, :, None]
-            asked, found = (overlap[0] & overlap[1] & overlap[2]).nonzero()
-            return asked, found
+            given, found = (overlap[0] & overlap[1] & overlap[2]).nonzero()
+            return given, found
         pairs = [self._met_of(one, low, high) for one in self._classes]
-        asked, found = (np.concatenate(column) for column in zip(*pairs, strict=True))
-        order = np.argsort(asked * self._low.shape[1] + found, kind="stable")
-        return asked[order], found[order]
+        given, found = (np.concatenate(column) for column in zip(*pairs, strict=True))
+        order = np.argsort(given * self._low.shape[1] + found, kind="stable")
+        return given[order], found[order]
 
     def _met_of(self, one: _Class, low: Floats, high: Floats) -> tuple[Indices, Indices]:
         axis = self._axis
         first = np.searchsorted(one.begins, low[axis] - one.size, side="left")
         last = np.searchsorted(one.begins, high[axis], side="right")
         counts = np.maximum(last - first, 0)
-        asked = np.repeat(np.arange(low.shape[1]), counts)
-        place = np.arange(len(asked)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)
+        given = np.repeat(np.arange(low.shape[1]), counts)
+        place = np.arange(len(given)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)
         found = one.members[place]
         for number in (axis, (axis + 1) % 3, (axis + 2) % 3):
-            kept = (self._low[number][found] <= high[number][asked]) & (self._high[number][found] >= low[number][asked])
-            asked, found = asked[kept], found[kept]
-        return asked, found
+            kept = (self._low[number][found] <= high[number][given]) & (self._high[number][found] >= low[number][given])
+            given, found = given[kept], found[kept]
+        return given, found
 
 
 def met_among(several: Sequence[SortedBoxes], low: Floats, high: Floats) -> tuple[Indices, Indices]:
-    """Return what `SortedBoxes.met` does, of several one after the other, whose numbers go on."""
+    """Return the pairs of `SortedBoxes.met` for several in a row, with consecutive numbers of boxes."""
     if len(several) == 1:
         return several[0].met(low, high)
     before, pairs = 0, []
     for one in several:
-        asked, found = one.met(low, high)
-        pairs.append((asked, found + before))
+        given, found = one.met(low, high)
+        pairs.append((given, found + before))
         before += one.count
-    asked, found = (np.concatenate(column) for column in zip(*pairs, strict=True))
-    order = np.argsort(asked, kind="stable")
-    return asked[order], found[order]
+    given, found = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    order = np.argsort(given, kind="stable")
+    return given[order], found[order]

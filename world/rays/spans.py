@@ -1,4 +1,4 @@
-"""Where a straight line is inside of a box, a sphere, a cylinder or a capsule, in the frame of that shape.
+"""Spans of a straight line inside of a box, a sphere, a cylinder or a capsule, in the frame of that shape.
 
 A line is a start and a unit direction; places on it are metres from the start. A line that touches a face, an edge or
 a corner is not inside. All of it is + - * / and `sqrt` on plain floats; `kernels` has the same for arrays, with the
@@ -14,7 +14,7 @@ from math import inf, sqrt
 from foosim.world.scene import Vector
 
 Span = tuple[float, float]
-"""Where a line enters something and where it leaves it (m)."""
+"""The places at which a line enters and leaves a shape (m)."""
 
 
 def box_span(start: Vector, way: Vector, half: Vector) -> Span | None:

@@ -1,4 +1,4 @@
-"""Where straight lines pass through the triangles of a mesh, one line or many, with the same bits.
+"""Hits of straight lines on the triangles of a mesh, one line or many, with the same bits.
 
 A line is a start and a unit direction; places on it are metres from the start. A line that touches an edge or a corner
 is taken for one a little beside it. Source: Woop, Benthin and Wald, "Watertight ray/triangle intersection" (JCGT
@@ -19,11 +19,11 @@ from foosim.world.rays.boxes import STEP_MIN, Floats, as_columns, between_sides,
 from foosim.world.scene import Vector
 
 BLOCK: Final = 32
-"""Triangles that are looked at together."""
+"""The count of triangles in a block."""
 LINES_AT_ONCE: Final = 16_384
-"""Of many lines so many are compared at once with the box around a block: what is computed stays in a cache."""
+"""The count of lines compared at once with the boxes around blocks: their arrays stay in a cache."""
 BLOCKS_AT_ONCE: Final = 512
-"""So many blocks of triangles are computed at once, each for a line."""
+"""The count of blocks of triangles computed at once, each for a line."""
 
 _EDGES: Final = ((1, 2), (2, 0), (0, 1))
 """Each opposite to the corner of its number."""
@@ -37,11 +37,11 @@ class Triangles:
         corners = mesh.vertices[mesh.triangles]
         corners = corners[np.argsort(_along_a_curve(corners), kind="stable")]
         missing = -len(corners) % BLOCK
-        # Blocks are filled up with triangles without an area, which nothing hits, at a place that is in the block.
+        # Blocks are filled up with triangles without an area, never hit, at a place in the block.
         filled = np.concatenate((corners, np.repeat(corners[-1:, :1], missing * 3, axis=1).reshape(missing, 3, 3)))
         blocks = filled.reshape(-1, BLOCK * 3, 3)
         self._boxes = boxes_around(blocks.min(axis=1), blocks.max(axis=1))
-        # (coordinate, corner, block, triangle): what is computed together stands together.
+        # (coordinate, corner, block, triangle): numbers that are computed together are neighbours.
         self._corners = np.ascontiguousarray(filled.reshape(-1, BLOCK, 3, 3).transpose(3, 2, 0, 1))
 
     def hits(self, start: Vector, way: Vector) -> list[float]:
@@ -57,7 +57,7 @@ class Triangles:
         return found
 
     def hits_of_many(self, starts: Floats, ways: Floats) -> tuple[NDArray[np.int64], Floats]:
-        """Return of many lines (3, n) which ones pass through triangles, and where: in the order of lines, then places.
+        """Return the hits of many lines (3, n): lines and places, in the order of lines, then places.
 
         Each has the bits that `hits` gives.
         """
@@ -96,14 +96,14 @@ class Triangles:
 
 
 def _shares(chosen: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Divide what is computed at once, so that its arrays stay small."""
+    """Divide the work, so that arrays stay small."""
     return [chosen[begin : begin + BLOCKS_AT_ONCE] for begin in range(0, len(chosen), BLOCKS_AT_ONCE)]
 
 
 def _crossed(
     corners: Floats, start: Vector | Floats, way: Vector | Floats, long: int
 ) -> tuple[NDArray[np.bool_], Floats]:
-    """Return which triangles lines pass through, and where.
+    """Return the triangles that lines pass through, and the places.
 
     `corners` are by coordinate, corner, block, triangle; starts and ways are numbers, or a number for each block.
     `long` is the coordinate in which a line goes farthest, the first of equal ones.

@@ -1,1 +1,1 @@
-"""What is set while a run goes on: fields of entities, and places."""
+"""Settings during a run: fields of entities, and places."""

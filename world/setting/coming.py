@@ -1,4 +1,4 @@
-"""Who can come into a world and leave it, by the name that somebody has typed."""
+"""Entities that can come into a world and leave it, by the name in a command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NUMBERED: Final = re.compile(r"(?P<fleet>.+)-(?P<number>[0-9]+)")
 
 
 def absent_named(layout: Layout, numbers: Sequence[float], name: str) -> Entity:
-    """Return the absent entity that a name is of: its own, or that of its fleet, of which it is the first one absent.
+    """Return the absent entity of this name, or the first absent one of the fleet of this name.
 
     Raises Refused where nothing of that name is absent.
     """
@@ -42,7 +42,7 @@ def _numbered(layout: Layout, name: str) -> list[tuple[int, Entity]]:
 
 
 def check_present(layout: Layout, numbers: Sequence[float], name: str) -> None:
-    """Raise Refused for what cannot be removed: it is not in the world, or always."""
+    """Raise Refused for an entity that cannot be removed: it is absent, or always in the world."""
     if name not in layout:
         known = [entity.name for entity in layout.entities if entity.can_leave and not entity.is_absent(numbers)]
         raise Refused(UnknownName("nothing to remove", name, known).what)
@@ -53,4 +53,4 @@ def check_present(layout: Layout, numbers: Sequence[float], name: str) -> None:
 
 
 def _always(name: str) -> str:
-    return f"{name} is always in the world: what is fixed, or belongs to a kit, neither comes nor goes"
+    return f"{name} is always in the world: fixed entities, and those of a kit, neither come nor go"

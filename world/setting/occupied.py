@@ -1,4 +1,4 @@
-"""What is at the place to which an entity is put while a run goes on."""
+"""Occupied places: the thing at the place to which an entity is put during a run."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from foosim.world.spec import WorldSpec
 
 
 def occupied_by(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
-    """Return what an entity is in where the numbers of a frame put it: scenery or another entity; empty if in nothing.
+    """Return the thing that an entity overlaps in the numbers of a frame, scenery or an entity; empty without one.
 
-    Rigid bodies are compared by their shapes, what moves by kinematics by its cylinder.
+    Rigid bodies are compared by their shapes, entities that move by kinematics by their cylinders.
     """
     found = overlapped(spec, layout, numbers, entity) if layout.couples or entity.is_rigid else ""
     return found or _met_upright(spec, layout, numbers, entity)
 
 
 def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
-    made = layout.shared("uprights", spec, partial(_Standing, spec, layout))
-    assert isinstance(made, _Standing)
+    made = layout.shared("uprights", spec, partial(_Uprights, spec, layout))
+    assert isinstance(made, _Uprights)
     its = made.uprights.get(entity.index)
     if its is None:
         return ""
@@ -49,8 +49,8 @@ def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], enti
     return ""
 
 
-class _Standing:
-    """What moves by kinematics in the frames of a layout, by index, and the scenery."""
+class _Uprights:
+    """The entities of a layout that move by kinematics, by index, and the scenery."""
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self.uprights: dict[int, Upright] = {

@@ -24,7 +24,7 @@ class Schedule:
         self.by_tick = events_by_tick(spec)
 
     def edits(self, tick: int, frame: Frame, before: Sequence[Edit] = ()) -> list[Edit]:
-        """Return what the events of a tick do after these edits of a frame. Raises ComponentError."""
+        """Return the edits of a tick's events after these edits of a frame. Raises ComponentError."""
         found: list[Edit] = []
         layout = frame.layout
         for one in self.by_tick.get(tick, ()):
@@ -47,7 +47,7 @@ def _edits(
 
 
 def event_findings(spec: WorldSpec) -> Iterator[Finding]:
-    """Yield what is wrong with events: entities that are not there or too few, fields that are not settable, values."""
+    """Yield problems of events: unknown or too few entities, fields that cannot be set, invalid values."""
     layout = build_layout(spec)
     numbers: Sequence[float] = ()
     for number, event in enumerate(spec.events):
@@ -66,7 +66,7 @@ def event_findings(spec: WorldSpec) -> Iterator[Finding]:
 def _findings(
     spec: WorldSpec, layout: Layout, numbers: Sequence[float], number: int, things: Sequence[Scheduled]
 ) -> Iterator[Finding]:
-    """Yield the first problem of each thing that an event does to entities."""
+    """Yield the first problem of each effect of an event on entities."""
     found: set[Location] = set()
     for one in things:
         location: Location = ("events", number, one.verb, *([one.field] if one.field else ()))

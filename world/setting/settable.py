@@ -1,6 +1,6 @@
-"""What can be set of an entity while a run goes on: its pose, whether a robot is out of service, which of its
-components are switched off, what its model and its rules declare; of the world what the rules of the world declare; and
-the edits that set it, and that add an entity.
+"""Fields of an entity that can be set during a run: its pose, whether a robot is out of service, its switched-off
+components, the declared fields of its model and rules, and those of the world's rules; the edits that set them, and
+that add an entity.
 
 A pose is set as the deployment would place it: the model places it at tick 0, elsewhere.
 """
@@ -42,15 +42,15 @@ STOPPED: Final = ("linear_velocity", "angular_velocity", "base_velocity", "wheel
 """The fields of a state that are 0 in an entity that was put elsewhere."""
 QUARANTINED: Final = "quarantined"
 FLAGS: Final = ("0", "1")
-"""Shares that need no unit: nothing and all."""
+"""The texts of the shares 0 and 1."""
 WITH_A_PLACE: Final = frozenset((*PLACED[1:], *STOPPED, QUARANTINED))
-"""What is set with a position."""
+"""The fields that are set with a position."""
 
 
 class Pose(NamedTuple):
-    """Where something is put, as models read it in their setting `at`: lengths in m, angles in rad.
+    """A pose of an entity, as models read it in their setting `at`: lengths in m, angles in rad.
 
-    What has a heading stands upright, and reads `yaw`; all others read `orientation`.
+    Models with a heading are upright, and read `yaw`; all others read `orientation`.
     """
 
     x: float
@@ -66,7 +66,7 @@ class Pose(NamedTuple):
 
 
 def settable(spec: WorldSpec, layout: Layout, entity: Entity) -> dict[str, str]:
-    """Return the fields of an entity that can be set, and what is valid for each."""
+    """Return the fields of an entity that can be set, and the valid values of each."""
     found: dict[str, str] = {}
     if entity.is_robot:
         found[DOWN] = "true or false"
@@ -80,13 +80,13 @@ def settable(spec: WorldSpec, layout: Layout, entity: Entity) -> dict[str, str]:
 
 
 def valid(quantity: Quantity) -> str:
-    """Return in words which values of a quantity can be set."""
+    """Return in words the values of a quantity that can be set."""
     flag = ", or true or false" if quantity.dimension is PROBABILITY else ""
     return f"{quantity.low} to {quantity.high}{flag}"
 
 
 def _field(label: str, name: str) -> str:
-    """Return what the field of a rule of this name is called; that of a model, which has no name, is called so."""
+    """Return the full name of a field of a rule, or of a model, whose label is empty."""
     return f"{label}.{name}" if label else name
 
 
@@ -109,7 +109,7 @@ def set_edits(
 ) -> list[Set]:
     """Return the edits that set a field of an entity.
 
-    A pose is completed by that in the numbers of a frame. Raises BadValue for a field that is not settable, a value
+    A pose is completed by that in the numbers of a frame. Raises BadValue for a field that cannot be set, a value
     beyond its limits, and, if it `is_checked`, a place that is occupied in that frame; ComponentError for a component
     that raises.
     """
@@ -150,20 +150,20 @@ def _number(quantity: Quantity, value: object) -> float:
 
 
 def _of_component(
-    entity: Entity, label: str, ask: Callable[[str, float], Mapping[str, Sequence[float]]], name: str, number: float
+    entity: Entity, label: str, change: Callable[[str, float], Mapping[str, Sequence[float]]], name: str, number: float
 ) -> list[Set]:
-    """Return what a component says that its slots become: its own, else those that are fields of the entity."""
+    """Return the edits of a component's slots for a value: its own slots, else fields of the entity."""
     found = []
-    for slot, numbers in ask(name, number).items():
+    for slot, numbers in change(name, number).items():
         field = _field(label, slot) if _field(label, slot) in entity.offsets else slot
         if entity.counts.get(field) != len(numbers) or not all(map(isfinite, numbers)):
-            raise ContractError(ask, "finite numbers by slot, as many as each has", {slot: numbers})
+            raise ContractError(change, "finite numbers by slot, as many as each has", {slot: numbers})
         found.append(Set(entity.name, field, [*map(float, numbers)]))
     return found
 
 
 def _declared(spec: WorldSpec, layout: Layout, entity: Entity) -> Iterator[tuple[str, Any, Mapping[str, Quantity]]]:
-    """Yield what has something that can be set: the model, without a name, and the rules; each with what that is."""
+    """Yield the model, without a name, and the rules with fields that can be set; each with these fields."""
     if entity.name == WORLD:
         settings = spec.world_rules
         yield from (
@@ -191,7 +191,7 @@ def _put(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Enti
 
 
 def _place(spec: WorldSpec, layout: Layout, entity: Entity, pose: Pose, view: WritableView) -> None:
-    """Write the state of an entity that starts with a pose. What has no settings is put by its model's `place_at`."""
+    """Write the state of an entity that starts with a pose. Without settings the model's `place_at` puts it."""
     what, at = f"model {entity.model}", mounting_of(spec, layout, entity)
     if spec.settings_of(entity.name) is not None:
         made: Any = called(what, entity.name, 0, entity.kind.factory, _elsewhere(spec, entity, pose), at)
@@ -211,9 +211,9 @@ def add_edit(
     *,
     is_checked: bool = True,
 ) -> Add:
-    """Return the edit that adds an absent entity, as it would be at tick 0; `place` is where, if not there.
+    """Return the edit that adds an absent entity, as at tick 0, or at `place`.
 
-    Rules of the world remember nothing of it. It raises as `set_edits` does.
+    Slots of the world's rules for it begin anew. It raises as `set_edits`.
     """
     after, start = [*numbers], entity.start
     after[start : entity.stop] = [0.0] * (entity.stop - start)
@@ -235,7 +235,7 @@ def add_edit(
 
 
 def check_place(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> None:
-    """Raise BadValue where an entity is in something in a frame of these numbers, or beyond the bounds of its model."""
+    """Raise BadValue where an entity overlaps a thing in a frame of these numbers, or is beyond its model's bounds."""
     at = entity.offsets["position"]
     where = ", ".join(f"{number:g} m" for number in numbers[at : at + 3])
     if not model_of(spec, layout, entity).is_plausible(numbers, numbers):
@@ -247,33 +247,33 @@ def check_place(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entit
 def _elsewhere(spec: WorldSpec, entity: Entity, pose: Pose) -> Any:
     """Return the settings of an entity with another place."""
     settings = spec.settings_of(entity.name)
-    assert settings is not None, "what has no settings has no place of its own"
+    assert settings is not None, "an entity without settings has no place of its own"
     if AT in type(settings).model_fields:
         return settings.model_copy(update={AT: pose})
     return settings.model_copy(update={"x": pose.x, "y": pose.y, "heading": pose.yaw})
 
 
 def _completed(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity, value: object) -> Pose:
-    """Return the pose that is asked for: what it does not say is as in the numbers of a frame.
+    """Return the requested pose, with missing coordinates from the numbers of a frame.
 
-    Without an angle the entity keeps its orientation, with one the angles that are not said are 0.
+    Without an angle the entity keeps its orientation, with one the missing angles are 0.
     """
     keys = read_place(value) if isinstance(value, str) else value
     if not isinstance(keys, dict) or not keys or not keys.keys() <= At.model_fields.keys():
         raise BadValue("no place: valid are X,Y or X,Y,Z, or some of x, y, z, roll, pitch, yaw", value)
     try:
-        asked = At.model_validate(keys)
+        requested = At.model_validate(keys)
     except ValidationError as error:
         first = error.errors()[0]
         raise BadValue(".".join(map(str, first["loc"])) + f": {first['msg']}", first["input"]) from None
-    if entity.kind.motion and (problem := leaning(asked)) is not None:
+    if entity.kind.motion and (problem := leaning(requested)) is not None:
         raise problem
     position, orientation = _frame_of(spec, layout, numbers, entity)
-    x, y, z = (getattr(asked, key) if key in keys else was for key, was in zip("xyz", position, strict=True))
+    x, y, z = (getattr(requested, key) if key in keys else was for key, was in zip("xyz", position, strict=True))
     if {"roll", "pitch", "yaw"}.isdisjoint(keys):
         yaw = numbers[entity.offsets["heading"]] if "heading" in entity.offsets else 0.0
         return Pose(x, y, z, yaw, orientation)
-    return Pose(x, y, z, asked.yaw, asked.orientation)
+    return Pose(x, y, z, requested.yaw, requested.orientation)
 
 
 def read_place(text: str) -> dict[str, str]:
@@ -286,7 +286,7 @@ def read_place(text: str) -> dict[str, str]:
 
 
 def _frame_of(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> tuple[Vector, Quaternion]:
-    """Return the pose of what the setting `at` of an entity is the pose of."""
+    """Return the pose in a frame of the part that the setting `at` of an entity places."""
     if entity.is_rigid:
         _, position, orientation = forward_kinematics(body_of(spec, layout, entity), entity, numbers)[0]
         return position, orientation
