@@ -153,7 +153,7 @@ def _seen(evidence: Evidence, row: PacketRow) -> Seen:
     """Return a packet with its link at its time of sending, and all that was known of events when it arrived."""
     tick_ns = evidence.deployment.tick_ns
     fabric, tick = Fabric(evidence.deployment), row.sent_ns // tick_ns
-    for at, event in evidence.asked:
+    for at, event in evidence.requested:
         if at <= max(tick, row.arrival_tick):
             fabric.take(at, at * tick_ns, event)
     setup = fabric.link(row.source, row.destination, row.channel).setup_at(row.sent_ns)

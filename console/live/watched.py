@@ -72,8 +72,8 @@ class WatchList:
         messages = []
         for source, destination in links:
             link, rows = (source, destination), report.get("drops", {}).get(f"{source}>{destination}", [])
-            asked = [(tick, event) for tick, event in report.get("asked", [])]
-            drops[link], rules[link] = rows, self._rules.text(source, destination, at_ns, asked, who)
+            events = [(tick, event) for tick, event in report.get("events", [])]
+            drops[link], rules[link] = rows, self._rules.text(source, destination, at_ns, events, who)
             if self._last_drops.get(link) != rows or self._last_rules.get(link) != rules[link]:
                 messages.append(self._message(report, source, destination, rules[link]))
         self._last_drops, self._last_rules = drops, rules
@@ -106,6 +106,6 @@ def explain_drops(
     """
     rows = msgspec.convert(report["drops"].get(f"{link[0]}>{link[1]}", []), list[PacketRow])
     here = [ClientRow(0, name, "joins", 0, []) for name in report["here"]]
-    asked = [(tick, event) for tick, event in report["asked"]]
-    evidence = Evidence(deployment, model_versions(deployment.network), asked, frame, lambda: here)
+    events = [(tick, event) for tick, event in report["events"]]
+    evidence = Evidence(deployment, model_versions(deployment.network), events, frame, lambda: here)
     return [(row, explain_row(evidence, row)) for row in rows]

@@ -144,7 +144,7 @@ def test_what_this_world_does_not_have_is_not_asked_for() -> None:
 
 def test_a_link_that_is_watched_is_told_with_its_rule_before_it_drops_anything() -> None:
     found = following()
-    report = {"drops": {"camera>player-red": []}, "readings": {}, "asked": [], "here": []}
+    report = {"drops": {"camera>player-red": []}, "readings": {}, "events": [], "here": []}
     watched = status("running") | {"watched": report}
     wanted = Wanted(1, links=(("camera", "player-red"), ("camera", "player-blue")))
     (told,) = found.explained(watched, wanted)

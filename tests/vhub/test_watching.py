@@ -203,7 +203,7 @@ def test_an_event_that_was_asked_for_is_known_in_an_explanation() -> None:
     policy = [step.text for _, explained in told for step in explained.steps if step.stage == "policy"]
     assert all("cut by request 1" in text for text in policy)
     deployment = run.system.supervisor.state.deployment
-    console, (tick, _) = Shown(deployment), run.watched["asked"][-1]
+    console, (tick, _) = Shown(deployment), run.watched["events"][-1]
     calm = {**run.watched, "drops": {f"{LINK[0]}>{LINK[1]}": []}}
     (before,) = console.drops(calm, [LINK], (tick - 1) * deployment.tick_ns, {tick: "browser 3"})
     assert "cut" not in before["rule"] and console.drops(calm, [LINK], (tick - 1) * deployment.tick_ns) == []

@@ -1,4 +1,4 @@
-"""Where endpoints are and what stands between them, as of the newest committed frame."""
+"""Places of endpoints and what lies between them, as of the newest committed frame."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class World:
         return velocity(robot.body, robot.entity, self._values())
 
     def vehicle_height_m(self, name: str) -> float | None:
-        """Return how high the hull of a vehicle is, without its antenna (m); None for what is no vehicle."""
+        """Return the height of a vehicle's hull without its antenna (m); None for other robots."""
         robot = self._deployment.robots.get(name)
         if robot is None or not (VEHICLE in robot.tags or VEHICLE in robot.component_type.tags):
             return None

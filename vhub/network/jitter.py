@@ -40,7 +40,7 @@ HALF_CELLS: Final = 64
 HALVES: Final = 48
 """How often what is left above is halved: what is rarer than 2^-52 is as great as that."""
 GAMMA_HALVES: Final = 24
-"""The same of a gamma distribution: P(a, x) as a float tells no more from 1."""
+"""The same of a gamma distribution: beyond, P(a, x) rounds to 1 as a float."""
 _TAIL_BITS: Final = 60
 _TAIL_WORD: Final = TAIL_CELL << 52
 _HALF_BITS: Final = HALF_CELLS.bit_length()

@@ -265,7 +265,7 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     links: list[tuple[str, str, str, LinkState]]
     radios: list[tuple[str, str, RadioState]]
     airs: list[tuple[str, AirState]]
-    asked: list[tuple[int, str]]
+    requested: list[tuple[int, str]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
     ages: list[tuple[str, list[HeardState]]]

@@ -38,7 +38,7 @@ class Mode:
 
     @property
     def control_bits(self) -> int:
-        """Of the frame that answers it: the highest mandatory rate (6, 12, 24 Mb/s) that is not above its own."""
+        """Of the frame that answers it: the highest mandatory rate (6, 12, 24 Mb/s) up to its own."""
         if self.points == 2:
             return 24
         return 48 if self.points == 4 else 96

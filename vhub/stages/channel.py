@@ -109,9 +109,9 @@ class Channel(Stage):
                 note.text += f", others at SF{factor} {dbm:g} dBm: {ratio_db:g} dB over them of {needed_db} dB needed"
 
     def _walls(self, seen: Seen) -> dict[str, float | None]:
-        """Return what is in the way, with what each takes in dB; None where it is not known any more.
+        """Return the obstacles on the way, with the loss of each in dB; None where they are not known any more.
 
-        Bodies move: the newest captured frame before the packet tells, if what it says adds up to what the row has.
+        Bodies move: the newest captured frame before the packet counts, if its losses add up to the row's.
         """
         row, of = seen.row, self._budget.propagation
         frame = seen.evidence.frame(seen.tick) if row.walls else None

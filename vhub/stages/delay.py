@@ -99,7 +99,7 @@ class Delay(Stage):
     def put_off(self, flight: Flight, by_ns: int, last_ns: dict[int, int]) -> None:
         """Delay a packet; `last_ns` are the due times of the deferred ones before it, by link.
 
-        It is called in the order of sending, also for later packets that are not deferred.
+        It is called in the order of sending, also for later packets without deferral.
         """
         free_ns = flight.due_ns - flight.held_ns + by_ns
         due_ns = self._held_ns(free_ns) if self._holds else free_ns

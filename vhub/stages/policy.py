@@ -20,7 +20,7 @@ EXPIRED: Final = "expired"
 
 
 class Policy(Stage):
-    """Drops packets while the link is cut or filtered, and those that are too old."""
+    """Drops packets while the link is cut or filtered, and packets that are too old."""
 
     def __init__(self, setup: LinkSetup) -> None:
         self._cuts, self._at_arrival = setup.cuts, setup.in_flight_dropped

@@ -12,7 +12,7 @@ from foosim.vhub.stages.stage import Stage
 
 RECEIVER_DOWN: Final = "rx_down"
 RECEIVER_FULL: Final = "rx_full"
-"""The packets of a receiver at one tick are one message: those that exceed its size are dropped."""
+"""The packets of a receiver at one tick are one message: packets beyond its size are dropped."""
 TRANSIT_FULL: Final = "transit_full"
 """Found at sending: there is a limit of bytes in flight in the whole run."""
 

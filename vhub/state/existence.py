@@ -24,8 +24,7 @@ def robots_it_lives_by(deployment: Deployment, player: Player) -> tuple[str, ...
 
 
 class Existence:
-    """The players of a deployment, as of the newest frame: `turn_to` writes `since` and `absent` of those that take
-    part."""
+    """The players of a deployment, as of the newest frame: `turn_to` writes `since` and `absent` of members."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._robots = {name: sorted(player.robots) for name, player in deployment.players.items()}

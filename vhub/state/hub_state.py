@@ -211,7 +211,7 @@ class HubState:
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
         self.was_final = tick < self.final
         if self.was_final:
-            assert not any(member.is_due(tick) for member in self.members.values()), f"tick {tick} asks a client"
+            assert not any(member.is_due(tick) for member in self.members.values()), f"a client is due at tick {tick}"
             assert not deliveries, f"deliveries {tick + 1} were final without packets"
             return Deliveries(tick + 1, [])
         following = self._following(tick)
@@ -374,7 +374,7 @@ class HubState:
         self._put(flight, arrival if member is None else member.release_tick(arrival))
 
     def _put(self, flight: Flight, arrival: int) -> None:
-        """Add a packet to those that arrive at a tick."""
+        """Add a packet to the arrivals of a tick."""
         flight.arrival_tick = arrival
         flights = self._flights.get(arrival)
         if flights is None:
@@ -487,7 +487,7 @@ class HubState:
                 "links": [[*key, fabric.states[key]] for key in sorted(fabric.states)],
                 "radios": [[*key, fabric.radios[key]] for key in sorted(fabric.radios)],
                 "airs": [[name, fabric.airs[name].state] for name in sorted(fabric.airs)],
-                "asked": fabric.asked,
+                "requested": fabric.requested,
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
                 "ages": self.ages.state(),
@@ -506,7 +506,7 @@ class HubState:
         for name, written in content.members:
             state.members[name] = Member(written)
         state._here.renew(state.members)
-        state.fabric.restore(content.links, content.radios, content.airs, content.asked)
+        state.fabric.restore(content.links, content.radios, content.airs, content.requested)
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final
         state.ages.restore(content.ages)

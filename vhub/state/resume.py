@@ -1,6 +1,6 @@
 """Restores a restarted vHub from the journal of the process before it.
 
-A fold of the journal gives the state after the last closed tick. On the way it gives what others may still ask for
+A fold of the journal gives the state after the last closed tick. On the way it gives what others may still request
 (deliveries, numbered downlinks) and what the capture lacks. Pure: the shell reads the journal and knows how far the
 capture is.
 """
