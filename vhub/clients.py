@@ -91,7 +91,7 @@ class Clients:
         return None if self._state is None else self._state.members.get(name)
 
     def come_and_go(self, tick: int) -> tuple[list[Joining], list[str]]:
-        """Return who joins and leaves at a tick. The tick's Go depends on it and leaves before the tick's record is
+        """Return joining and leaving clients of a tick. Its Go depends on them and leaves before the tick's record is
         written, so it has a record of its own."""
         assert self._state is not None
         written, self.written = self.written, None
@@ -182,7 +182,7 @@ class Clients:
         repeated = session.take(up.packets)
         if repeated:
             self._state.reject_on_receipt("duplicate", repeated)
-            session.heard = 0  # acknowledge again: it does not know what is recorded
+            session.heard = 0  # acknowledge again: it lacks the acknowledgement
 
     def on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
         """Take a lockstep client's answer to a Go."""
@@ -243,7 +243,7 @@ class Clients:
         return session
 
     def _last_sent(self, name: str) -> int | None:
-        """Return the last downlink sent to a client: neither a Go without a Done nor one that is yet to be released."""
+        """Return the last downlink sent to a client: neither a Go without a Done nor an unreleased one."""
         member = None if self._state is None else self._state.members.get(name)
         if member is None or self._releases is None:
             return None
@@ -323,8 +323,8 @@ class Clients:
     def wake(self, now_ns: int, *, holds: bool) -> None:
         """Repeat Go, and end the run or continue without clients whose answer or return is overdue.
 
-        Both deadlines are suspended while the run is paused. They begin anew while the vHub `holds`, which is when it
-        waits for its supervisor: what closed that connection may have closed those of clients as well.
+        Both deadlines are suspended while the run is paused. They begin anew while the vHub `holds`, waiting for its
+        supervisor: the cause that closed that connection may have closed connections of clients as well.
         """
         if self._state is None:
             return
@@ -379,7 +379,7 @@ class Clients:
             self._sessions.send_owed(name, now_ns)
 
     def _is_waited_for(self, name: str) -> bool:
-        """Whether the run waits for a client: it is in lockstep, or the tick that is being closed goes by its Done."""
+        """Whether the run waits for a client: it is in lockstep, or the present tick closes by its Done."""
         known = self._known(name)
         is_here = isinstance(known, Joining) or (known is not None and known.active and name not in self._leaves)
         is_in_lockstep = known is not None and is_here and known.period > 0

@@ -386,7 +386,7 @@ class HubCore:
         return True
 
     def _release_closed(self, world: _World, sent_ns: int) -> None:
-        """After the deliveries, release to free-running clients what is due by now."""
+        """After the deliveries, release to free-running clients the packets due by now."""
         state, releases = self.state, self.releases
         assert state is not None and releases is not None
         for name, flights in world.free.items():
@@ -445,7 +445,7 @@ class HubCore:
         )
 
     def _release(self, now_ns: int) -> None:
-        """Send what is released to free-running clients by now; closings of which nothing waits go to the capture."""
+        """Send packets to free-running clients that are due by now; closings without dependants go to the capture."""
         if self.releases is None or self.state is None:
             return
         for release in self.releases.take(now_ns, everything=self.finished):
@@ -573,7 +573,7 @@ class HubCore:
     # --- resuming ----------------------------------------------------------------------------------------------------
 
     def _resume_state(self) -> Publish:
-        """Return the report of how far the world has come here, which goes before each ready."""
+        """Return the report of the resume position, which is sent before each ready."""
         state, build = self.state, self.member.build
         assert state is not None and build is not None
         standing = ResumeState(
@@ -621,7 +621,7 @@ class HubCore:
     def _fences(self, commit: Commit) -> bool:
         """Whether a commit does not count: it is of an epoch before the present one.
 
-        Up to the epoch's first tick it counts under its old epoch: what is committed never changes.
+        Up to the epoch's first tick it counts under its old epoch: committed frames never change.
         """
         is_old = commit.epoch < self.epoch and commit.tick > self._epoch_tick
         return is_old or self.handshake.waits

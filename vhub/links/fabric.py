@@ -312,7 +312,7 @@ class Fabric:
             self.link(flight.source, flight.destination, flight.channel).restore(flight)
 
     def queue_ns(self, key: LinkKey, now_ns: int) -> int:
-        """Return how long what is sent on a link now waits before its turn comes."""
+        """Return how long (ns) a packet sent on a link now waits before its turn comes."""
         source, destination, name = key
         rule, _, radio = name.partition("/")
         senders = (source + _OWN_QUEUE + destination, rule), (source, radio or rule), (source, "")
@@ -357,7 +357,7 @@ def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
 
 
 def name_of(profile: Profile) -> str:
-    """Return a profile's name: its rule, and the radio where the rule does not say it."""
+    """Return a profile's name: its rule, and the radio if the rule does not imply it."""
     return link_name(profile.rule, profile.radio)
 
 

@@ -73,10 +73,10 @@ def _text(phase: Phase, heard: list[Ends], tick_ns: int) -> str:
     age, delay, best = (format_ns(ticks * tick_ns) for ticks in phase)
     player, source, channel = heard[0]
     players = len({name for name, _, _ in heard})
-    who = f"{player} sees" if players == 1 else f"{player} and {players - 1} more see"
+    players_text = f"{player} sees" if players == 1 else f"{player} and {players - 1} more see"
     channels = len({(endpoint, sent) for _, endpoint, sent in heard})
-    what = f"{source} {channel}" + (f" and {channels - 1} more channels" if channels > 1 else "")
+    source_text = f"{source} {channel}" + (f" and {channels - 1} more channels" if channels > 1 else "")
     return (
-        f"{who} {what} {age} old, of which the delay explains {delay}: sensor and player are in step; "
+        f"{players_text} {source_text} {age} old, of which the delay explains {delay}: sensor and player are in step; "
         f"an offset of {best} of the player, or act: arrival, leaves {delay}"
     )

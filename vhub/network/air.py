@@ -86,7 +86,7 @@ class Air:
     def turn(self, source: str, ready_ns: int, of: Propagation) -> tuple[int, int]:
         """Return when the turn of a station that is ready to send begins, and the number of contenders with it.
 
-        It waits for all that it hears; who has something queued or on air when it is ready contends.
+        It waits for all stations that it hears; stations with a packet queued or on air when it is ready contend.
         """
         place = of.place(source)
         start_ns = ready_ns
@@ -105,8 +105,8 @@ class Air:
     def contest(self, source: str, ready_ns: int, of: Propagation) -> Contest:
         """Return the contention that a station of 802.11 meets when it is ready to send.
 
-        Who has something queued or on air then contends; and, where packets of the station itself wait before this
-        one, who has about as many waiting by now: stations get as many turns as others in the long run.
+        Stations with a packet queued or on air then contend; where packets of the station itself wait before this one,
+        stations with about as many waiting by now: all get the same number of turns in the long run.
         """
         place, now_ns, free_ns, waiting = of.place(source), self._advanced_ns, ready_ns, 1
         hears: dict[str, bool] = {}

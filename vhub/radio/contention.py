@@ -29,7 +29,7 @@ from foosim.common.keyed_random import chance_threshold
 from foosim.vhub.radio.timings import LRWPAN, LrwpanTiming, WifiTiming
 
 CONTENDERS_MAX: Final = 200
-"""Of what is tabled; more count as that many."""
+"""The largest tabled count of stations; greater ones count as this."""
 TURNS_SAVED: Final = 0.8
 """By how many turns of others a station waits less after each of its collisions, since the one that it collided with
 waits in a doubled window, too. Judgement: fitted to a slot simulation of 2 to 20 stations (`tests/links/dcf.py`)."""

@@ -1,7 +1,7 @@
 """The channel: whether a signal that was sent is strong enough at its receiver, and clear of the others'.
 
-At sending it says what the medium has found out for a unicast, and judges the rest by the draw for errors; at arrival
-it judges again what others spoiled that began later: broadcasts, and whatever is not sent again.
+At sending it reports the medium's outcome of a unicast, and judges the rest by the draw for errors; at arrival
+it judges again broadcasts and packets without repeats, which a later transmission may have spoiled.
 """
 
 from __future__ import annotations

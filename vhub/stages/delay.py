@@ -86,7 +86,7 @@ class Delay(Stage):
             "reordered": self._extra_ns if self.is_late(seen.flight) else 0,
             "clog": row.held_ns,
         }
-        parts["order, behind the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
+        parts["order, after the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
         note.facts = {what: ns for what, ns in parts.items() if ns}
         text = " + ".join(f"{what} {exact(ns)}" for what, ns in note.facts.items()) or "no delay"
         note.add("{} = due {due_ns}", text, due_ns=row.due_ns)

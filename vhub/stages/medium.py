@@ -153,7 +153,7 @@ class OnAir(Stage):
             return
         chance = odds[0] / UNIT
         note.facts |= {"collision_chance": chance, "attempts": (attempts := [*self._attempts(seen, *odds)])}
-        runs = [(what, len([*those])) for what, those in groupby(attempts)]
+        runs = [(what, len([*equal])) for what, equal in groupby(attempts)]
         note.text += "; " + ", ".join(what if count == 1 else f"{count} x {what}" for what, count in runs)
         note.text += f" (an attempt collides with {chance:g})" if chance else ""
 

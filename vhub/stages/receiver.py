@@ -30,7 +30,7 @@ class Receiver(Stage):
     def explain(self, seen: Seen, note: Explanation) -> None:
         row, decided = seen.row, seen.row.decided_by
         if row.cause == TRANSIT_FULL:
-            note.add("what is on its way in the whole run leaves no room for it", due_ns=row.due_ns)
+            note.add("the packets in flight in the whole run leave no room for it", due_ns=row.due_ns)
             return
         note.add("due {due_ns}, arrives at tick {arrival_tick}", due_ns=row.due_ns, arrival_tick=row.arrival_tick)
         if row.cause == RECEIVER_DOWN:

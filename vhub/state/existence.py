@@ -1,7 +1,7 @@
 """Which players exist: a function of the frame, as which entities are in it.
 
-A player exists while one of the robots is present that it commands; one that commands none, while the robot is that it
-is on; one that is on none, while one of those is that it hears as its own. Without any of these it always exists.
+A player exists while one of the robots that it commands is present; without such robots, while the robot is present
+that carries it; without one, while a robot is present that it hears as its own. Without any of these it always exists.
 """
 
 from __future__ import annotations

@@ -109,10 +109,10 @@ class HubState:
         edits: Sequence[Edit] = (),
         counts: Sequence[int] | None = None,
     ) -> dict[str, list[Flight]]:
-        """Phase one of closing the frame's tick; `packets` are in (robot, index) order, `edits` those of the frame.
+        """Phase one of closing the frame's tick; `packets` are in (robot, index) order, `edits` the frame's edits.
 
-        `counts` are the packets' counts within their channels, None where `packets` are all that robots sent: then they
-        follow from these. Append the packets whose fate is final to `fates` and return what is released, by client.
+        `counts` are the packets' counts within their channels, None where `packets` are all packets of the robots: then
+        they follow from these. Append packets with a final fate to `fates` and return the released ones, by client.
         """
         tick = frame.tick
         assert tick == self.closed + 1, (tick, self.closed)
@@ -247,8 +247,8 @@ class HubState:
     def _following(self, tick: int) -> int:
         """Return for how many ticks after the next one no packet can reach a robot.
 
-        That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
-        filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
+        Nothing in flight arrives, and nothing is sent before: no sensor is due, no outbox is
+        filled, no lockstep client is due, or may be by packets in flight, none may join, and no other client is here.
         Samples besides a sensor's rate go to clients, which act when they are due.
         """
         if not self._here.is_complete:
@@ -359,10 +359,10 @@ class HubState:
                 on_links.setdefault(link, []).append(flight)
             else:
                 self._put(flight, flight.arrival_tick)
-        for link, those in on_links.items():
-            due_ns = [flight.due_ns for flight in those]
-            link.retime(those, now_ns)
-            for flight, before_ns in zip(those, due_ns, strict=True):
+        for link, flights in on_links.items():
+            due_ns = [flight.due_ns for flight in flights]
+            link.retime(flights, now_ns)
+            for flight, before_ns in zip(flights, due_ns, strict=True):
                 # The deliveries to robots of this tick are published already.
                 earliest = tick + (flight.destination in self._robots)
                 self._let_fly(flight, flight.arrival_tick if flight.due_ns == before_ns else earliest)

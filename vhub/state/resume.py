@@ -81,7 +81,7 @@ class Past:
 def recall(
     deployment: Deployment, run: str, records: Sequence[bytes], captured: Captured | None, kept_ns: int
 ) -> Past | None:
-    """Return what the records of a journal say; None when they are of no run or hold nothing.
+    """Return the past that a journal records; None without any tick.
 
     `captured` is how far the capture is, None when there is none; downlinks of the last `kept_ns` of simulated time
     are kept to be sent again. Raises Malformed for the journal of another run, and for one that contradicts itself.
