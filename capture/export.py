@@ -132,9 +132,7 @@ class ParquetSink:
             import pyarrow
             from pyarrow import parquet
         except ImportError:
-            raise NoParquet(
-                "Parquet needs pyarrow, which is missing: pip install 'foosim[parquet]', or --format csv"
-            ) from None
+            raise NoParquet("Parquet needs pyarrow: pip install 'foosim[parquet]', or --format csv") from None
         self._arrow = pyarrow
         types: dict[Kind, Any] = {
             "integer": pyarrow.int64(),

@@ -124,8 +124,8 @@ def test_a_vhub_whose_journal_is_damaged_goes_on_over_nothing(hub_run: HubRun, p
     journal.write_bytes(content)
     text = live(plane, hub_run, tmp_path)
     told = re.fullmatch(
-        r"lost vhub: it cannot continue: .*vhub-000001\.journal: byte \d+: record \d+ is damaged, \d+ whole .* after it; "
-        rf"tick (\d+) is the last before it\. A new run begins with the .*up table\.yaml --from {path}@last",
+        r"lost vhub: it cannot continue: .*vhub-000001\.journal: byte \d+: record \d+ is damaged, \d+ whole .* "
+        rf"after it; tick (\d+) is the last before it\. A new run begins with the .*up table\.yaml --from {path}@last",
         text,
     )
     assert told is not None, text
