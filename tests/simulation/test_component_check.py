@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue, DeploymentError
+from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.simulation.check.component_check import ComponentCheck, used_form
 from foosim.simulation.run import rehearse
@@ -96,6 +97,8 @@ OF_WORLD: Final = "rules={own: {kind: 'own_form:Own'}}"
 @pytest.fixture
 def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder on the path, and on that of further processes."""
+    loader._kept.clear()
+    sys.modules.pop("own_form", None)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     return tmp_path
@@ -104,6 +107,7 @@ def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def broken(planted: Path, source: str, sets: str, *, processes: bool = False, ticks: int = TICKS) -> list[str]:
     (planted / "own_form.py").write_text(HEAD + source)
     sys.modules.pop("own_form", None)
+    loader._kept.clear()  # deployments of the module before have its classes
     invalidate_caches()
     text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, sets])
     check = ComponentCheck(text, TABLE.name, ticks)

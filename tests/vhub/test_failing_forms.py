@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.deployment import loader
 from foosim.simulation.run import rehearse
 
 FORMS: Final = """
@@ -116,6 +117,7 @@ def forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     (tmp_path / "hub_forms.py").write_text(FORMS)
     monkeypatch.syspath_prepend(str(tmp_path))
     invalidate_caches()
+    loader._kept.clear()  # deployments of the module before have its classes
     yield import_module("hub_forms")
     sys.modules.pop("hub_forms")
 
