@@ -119,7 +119,7 @@ def test_what_follows_when_a_node_ends(
         ("exit 1", False, False, "lost supervisor: it ended with exit code 1"),
         ("exit 1", True, True, "lost supervisor: it ended with exit code 1"),
         ("exit 0", True, True, "lost supervisor: it ended with exit code 0"),
-        ("echo run mine cannot continue: no journal; exit 3", True, False, "run mine cannot go on: no journal"),
+        ("echo run mine cannot continue: no journal; exit 3", True, False, "run mine cannot continue: no journal"),
         ("echo MemoryError; exit 1", True, True, "lost supervisor: it ended with exit code 1: too little memory"),
     ],
 )
