@@ -21,7 +21,7 @@ class AgeAtUse:
 
 
 Channel = tuple[str, str, str]
-"""From whom, to whom, and the channel's name."""
+"""Source, destination, and the channel's name."""
 
 
 class AgeTallies:

@@ -1,7 +1,7 @@
-"""What became of one captured packet, and why: the stages that it went through, each with its numbers.
+"""The fate of one captured packet, and its causes: the stages of its link, each with its numbers.
 
-The numbers are those of its row; what a row does not have is made again from the deployment that is in the capture,
-the events that were asked for until then, and the packet's draws, whose address is in the row (`draw_address`): so
+The numbers are in its row; missing ones are computed again from the captured deployment,
+the events requested until then, and the packet's draws, whose address is in the row (`draw_address`): so
 they have to agree with the row's.
 """
 
@@ -65,7 +65,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """A packet, the stages in their order, and its fate. `agrees`: draws that are made again are those of its row."""
+    """A packet, the stages in their order, and its fate. `agrees`: draws that are made again equal the row's."""
 
     head: str
     steps: tuple[Step, ...]
@@ -76,7 +76,7 @@ class Explained:
 
 
 def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
-    """Return the row of a packet; raises BadValue, with those that there are, when there is no such one."""
+    """Return the row of a packet; raises BadValue, with the existing ones, when there is no such one."""
     found: dict[tuple[str, int], PacketRow] = {}
     sources: set[str] = set()
     for row in capture.rows(PACKETS):
@@ -95,24 +95,24 @@ def find_packet(capture: CaptureData, which: PacketName) -> PacketRow:
     names = [str(PacketName(which.source, which.sequence, *key)) for key in sorted(chosen if exact else found)]
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     shown = ", ".join(names[:NAMES_SHOWN]) + more
-    raise BadValue(f"{capture.path}: say which one of {shown}", str(which))
+    raise BadValue(f"{capture.path}: name one of {shown}", str(which))
 
 
 def explain_packet(capture: CaptureData, which: PacketName) -> Explained:
-    """Return what became of a captured packet. Raises BadValue for one that is not there, CaptureError."""
+    """Return the explanation of a captured packet's fate. Raises BadValue for an unknown one, CaptureError."""
     return explain_row(evidence_of(capture), find_packet(capture, which))
 
 
 def evidence_of(capture: CaptureData) -> Evidence:
-    """Return what a capture has beside the row of a packet."""
+    """Return the context of a capture's rows."""
 
     def frame(tick: int) -> Frame | None:
         frames = takewhile(lambda frame: frame.tick <= tick, capture.each_frame())
         return next(iter(deque(frames, maxlen=1)), None)
 
-    asked = [event for row in capture.rows(TICK) if isinstance(row, TickRow) for event in network_events(row)]
+    events = [event for row in capture.rows(TICK) if isinstance(row, TickRow) for event in network_events(row)]
     clients = partial(capture.rows, CLIENTS)
-    return Evidence(capture.deployment, capture.about.versions, asked, frame, clients)
+    return Evidence(capture.deployment, capture.about.versions, events, frame, clients)
 
 
 def explain_row(evidence: Evidence, row: PacketRow) -> Explained:
@@ -136,7 +136,7 @@ def explain_row(evidence: Evidence, row: PacketRow) -> Explained:
     words = seen.flight.words
     drawn = ((Slot.LOSS, row.loss_word), (Slot.JITTER, row.jitter_word), (Slot.ERROR, row.error_word))
     agrees = all(not word or word == f"{words[slot]:016x}" for slot, word in drawn)
-    verdict = _verdict(row, dropped_by) + ("" if agrees else "; its draws are NOT those of the address in its row")
+    verdict = _verdict(row, dropped_by) + ("" if agrees else "; its draws differ from the address in its row")
     return Explained(_head(seen), tuple(steps), verdict, row.fate, row.cause, agrees)
 
 
@@ -150,10 +150,10 @@ def _dropped_by(row: PacketRow) -> str:
 
 
 def _seen(evidence: Evidence, row: PacketRow) -> Seen:
-    """Return a packet with its link at its time of sending, and all that was known of events when it arrived."""
+    """Return a packet with its link at its time of sending, and all events known when it arrived."""
     tick_ns = evidence.deployment.tick_ns
     fabric, tick = Fabric(evidence.deployment), row.sent_ns // tick_ns
-    for at, event in evidence.asked:
+    for at, event in evidence.requested:
         if at <= max(tick, row.arrival_tick):
             fabric.take(at, at * tick_ns, event)
     setup = fabric.link(row.source, row.destination, row.channel).setup_at(row.sent_ns)
@@ -165,7 +165,7 @@ def _seen(evidence: Evidence, row: PacketRow) -> Seen:
 
 
 def network_events(row: TickMark | TickRow) -> list[tuple[int, str]]:
-    """Return what was asked of the network in a tick: the tick, and each event as JSON."""
+    """Return the requested events of the network in a tick: the tick, and each event as JSON."""
     return [(row.tick, edit.event) for edit in row.edits if edit.kind == "network"]
 
 

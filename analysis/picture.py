@@ -1,4 +1,4 @@
-"""Pictures that commands draw, by matplotlib, which is imported when a picture is asked for and at no other time."""
+"""Pictures that commands draw, by matplotlib, which is imported for a picture only."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def check_picture(out: Path) -> None:
     """
     check_name("--picture", out, "the picture", ENDINGS)
     if find_spec("matplotlib") is None:
-        raise Failed("--picture needs matplotlib, which is not installed: pip install 'foosim[plot]'")
+        raise Failed("--picture needs matplotlib: pip install 'foosim[plot]'")
 
 
 @contextmanager

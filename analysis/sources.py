@@ -1,7 +1,7 @@
-"""Where the numbers come from that media have beside their settings: what `foosim net presets` prints below a preset's.
+"""Sources of the numbers that media have beside their settings: printed by `foosim net presets` below a preset's.
 
-The numbers are those of the modules that hold them, so what is printed is what decides. The marks before the sources
-are those of `protocol.presets`.
+The numbers are read from the modules that use them. The marks before the sources
+are the ones of `protocol.presets`.
 """
 
 from __future__ import annotations

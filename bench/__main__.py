@@ -57,7 +57,7 @@ BENCHES: Final = (
         distributed.lines,
     ),
     Bench("realtime", "the table as processes in real time", with_default(realtime.realtime), realtime.lines),
-    Bench("spares", "what is absent, and what comes", with_default(spares.spares), spares.lines),
+    Bench("spares", "absent entities, and added ones", with_default(spares.spares), spares.lines),
     Bench("fleet", "kinematic robots with their poses, in one process", with_default(fleet.fleet), fleet.lines),
     Bench("bodies", "rigid bodies of any kind", lambda _: bodies.bodies(), bodies.lines),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),

@@ -1,10 +1,10 @@
 """`python -m bench.against REVISION [--pairs N] [--compiled]`: this tree against an earlier one.
 
 Both trees are used as they are checked out, or compiled as an install is, with the packages of this Python. A pair
-measures one after the other, in an order that changes from pair to pair, so that what else the machine does is the same
-for both; the figures are the ratios of the pairs' processor times. Ticks are those of a rehearsal without its start,
-which is run several times: what happens in a tick is the same in each, so it takes the least of its times, whatever
-else the machine does. Garbage is collected seldom, as in the processes of a run. The start is that of a command that
+measures one after the other, in an order that changes from pair to pair, so that other load of the machine is the same
+for both; the figures are the ratios of the pairs' processor times. Ticks are of a rehearsal without its start,
+which is run several times: a tick computes the same in each, so it takes the least of its times, whatever
+the other load. Garbage is collected seldom, as in the processes of a run. The start is the time of a command that
 rehearses one tick, and of the command's help.
 """
 
@@ -63,7 +63,7 @@ least = [list(map(min, zip(*[spent(seed) for _ in range(runs)]))) for seed in ra
 print(sum(map(sum, least)) / sum(map(len, least)))
 """
 START_TICKS: Final = 60
-"""Ticks at the beginning that do not count: in them is made what is made once."""
+"""Ticks at the beginning that do not count: they construct what is constructed once."""
 COMMAND: Final = "import sys; from foosim.cli import main; main()"
 
 
@@ -157,7 +157,7 @@ def _install(tree: Path, folder: Path) -> None:
 
 
 def ratio(name: str, measure: Measure, trees: tuple[Path, Path], pairs: int) -> Ratio:
-    """Measure so many pairs of (this tree, the other one), after one that warms both."""
+    """Measure `pairs` pairs of (this tree, the other one), after one that warms both."""
     for tree in trees:
         measure(tree)
     found: list[float] = []

@@ -54,7 +54,7 @@ class Answers:
 
 
 def answers(seconds: float = 20.0) -> Answers:
-    """Run for so many seconds."""
+    """Run for some seconds."""
     beside = ["-m", "bench.answers", "--connect"]
     with TemporaryDirectory() as folder:
         file = Path(folder) / "answers.yaml"

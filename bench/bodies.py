@@ -106,7 +106,7 @@ def _player(robots: dict[str, list[str]]) -> dict[str, Any]:
 
 
 class _Timed:
-    """An engine of islands whose solving is timed; what is at rest is not solved."""
+    """An engine of islands whose solving is timed; bodies at rest are not solved."""
 
     def __init__(self, deployment: Deployment, layout: Layout) -> None:
         self._engine: Any = make_engine(deployment, layout)

@@ -1,6 +1,6 @@
 """Deployments as `up` runs them: nodes, a recording vHub, supervisor and players as processes, in pace fast.
 
-The figure is the median of the runs' ratios to real time; processes and capture are those of that run.
+The figure is the median of the runs' ratios to real time; processes and capture are of that run.
 """
 
 from __future__ import annotations

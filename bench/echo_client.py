@@ -1,9 +1,9 @@
 """A client that sends packets to the robots' `echo` channel at a rate, and times what comes back.
 
-Free-running, a process of its own, made of the client library's core. Packets go to all robots in turn and hold but
-their number, 4 bytes, because a robot refuses what its outbox has no room for: 1 KiB a tick, here 56 packets, 500 for
-all nine robots. What has become due since the last look is sent in one message, looks being at least half a millisecond
-apart: the hub admits packets once a tick.
+Free-running, a process of its own, with the client library's core. Packets go to all robots in turn and hold only
+their number, 4 bytes, because a robot refuses packets beyond the room of its outbox: 1 KiB a tick, here 56 packets, 500
+for all nine robots. Packets that became due since the last look are sent in one message, looks being at least half a
+millisecond apart: the hub admits packets once a tick.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class EchoClient:
         self._times: list[tuple[int, int, int]] = []
         """Of each packet that came back, in ns: when, end to end, and when less what was due in simulated time."""
         self._names: list[tuple[str, int]] = []
-        """Of the same, by whom it was sent, and its number there."""
+        """Of the same: sender, and its number there."""
 
     def run(self) -> Echoed:
         """Wait for the first echo, send all, wait for the last ones."""

@@ -2,7 +2,7 @@
 
 Each has a sensor of its pose at 50 Hz, and a scanner of 24 rays at 10 Hz.
 
-They stand in rows on an empty floor and all drive in circles from the first tick on, side by side with neighbours that
+They start in rows on an empty floor and all drive in circles from the first tick on, side by side with neighbours that
 they have to look out for. Each fleet runs by itself, and with one client that hears all of it. Figures are processor
 time of a rehearsal on one node, in us a tick and in b.
 """
@@ -40,13 +40,13 @@ class Rounds(Player):
 
     def __init__(self, deployment: Deployment, parameters: Mapping[str, Any]) -> None:
         self._robots = sorted(deployment.robots)
-        self._is_told = False
+        self._has_sent = False
 
     def act(self, tick: int, samples: Samples) -> dict[str, Motion]:
         """Return the commands, in the first turn."""
-        if self._is_told:
+        if self._has_sent:
             return {}
-        self._is_told = True
+        self._has_sent = True
         return {robot: Motion(0.4 + 0.05 * (number % 7), 1.0) for number, robot in enumerate(self._robots)}
 
 

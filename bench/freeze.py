@@ -117,7 +117,7 @@ def renamed(name: str, renames: Mapping[str, str]) -> str:
 
 
 def unequal(here: Mapping[str, str], there: Mapping[str, str], without: Sequence[str] = ()) -> list[str]:
-    """Return the names whose digests differ, with where those are that only one side has."""
+    """Return the names whose digests differ, with the side of one-sided names."""
     sides = {name: (here.get(name), there.get(name)) for name in sorted({*here, *there} - {*without})}
     only = {(True, False): ", which the commit lacks", (False, True): ", which this tree lacks"}
     where = {name: only.get((bool(ours), bool(theirs)), "") for name, (ours, theirs) in sides.items()}
@@ -146,7 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for label, here, there in compared(chosen.commit, chosen.world or WORLDS, chosen.seconds):
             found = differences(here, there, renames)
             is_equal = is_equal and not found
-            print(f"{label}: {told(found, here)}", flush=True)
+            print(f"{label}: {summary(found, here)}", flush=True)
     except BenchError as error:
         print(error, file=sys.stderr)
         return 1
@@ -161,7 +161,7 @@ def compared(commit: str, worlds: Sequence[str], seconds: float) -> Iterator[tup
             yield f"{world}, seed {seed}", here, there
 
 
-def told(found: Sequence[str], here: World) -> str:
+def summary(found: Sequence[str], here: World) -> str:
     """Return the differences of a world for people, the first of them."""
     if not found:
         return f"equal ({here['ticks']} ticks, {len(here['fields'])} fields, {len(here['rows'])} topics)"

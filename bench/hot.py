@@ -1,9 +1,9 @@
 """`python -m bench.hot [RUN...] [--least PERCENT] [--json]`: the modules that ticks and packets spend their time in.
 
-Each run is interpreted, and profiled in all its threads from when what is made once is there; `verdict` is profiled
+Each run is interpreted, and profiled in all its threads after its first ticks; `verdict` is profiled
 whole. A module's share is the processor time within its
-own functions, of that within all of foosim's. What has been compiled already (numpy, msgspec, the physics engine) is
-left out, since compiling whoever calls it does not shorten it. A star marks what `setup.py` compiles, the last line is
+own functions, of the time within all of foosim's. Compiled libraries (numpy, msgspec, the physics engine) are
+left out, since compiling their callers does not shorten them. A star marks what `setup.py` compiles, the last line is
 the share of all that it leaves to the interpreter.
 """
 
@@ -43,7 +43,7 @@ FAST: Final = ("tick=2 ms", "substeps=4")
 
 
 class Profile:
-    """Processor time by file, of this thread and of those that begin while it is on."""
+    """Processor time by file, of this thread and of threads that begin while it is on."""
 
     def __init__(self) -> None:
         self._of_threads = [self._new()]
@@ -155,7 +155,7 @@ def lines(shares: dict[str, dict[str, float]], least: float, listed: set[str]) -
             row = "".join(f"{of_run.get(module, 0.0):10.2f}" for of_run in shares.values())
             shown.append(f"{'*' if module in listed else ' '} {module:32}{row}")
     left = (sum(share for module, share in of_run.items() if module not in listed) for of_run in shares.values())
-    return [*shown, f"{'  all that is not compiled':34}" + "".join(f"{share:10.2f}" for share in left)]
+    return [*shown, f"{'  all interpreted modules':34}" + "".join(f"{share:10.2f}" for share in left)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

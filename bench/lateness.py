@@ -1,17 +1,17 @@
 """How late packets leave the vHub in real time, and where that comes from: 5,000 a second to a client.
 
 A client sends at this rate to robots that answer; the answers come over a link whose delay is spread over several
-ticks. What is due within a tick reaches a client at that tick's end: fates know ticks. So a packet is late by how much
-the wall clock is further, when the packet leaves, than the end of the tick at which it arrives; behind its own due time
+ticks. A packet that is due within a tick reaches a client at that tick's end: fates know ticks. So a packet is late by
+the time from the end of the tick at which it arrives to its release, by the wall clock; after its own due time
 it is half a tick more in the mean. Wall time 0 of the run is that of its promptest tick within half a second around: a
-run that lags for longer has another time 0, as its pacing has behind a lag of 100 ms, and its lags are told beside.
+run that lags for longer has another time 0, as its pacing has after a lag of 100 ms, and its lags are listed beside.
 
-What is run is the table without players, at ticks of 5 ms, its physics by the engine `pure`, one substep each: light
-enough for two cores to keep the pace beside the packets, since a run that falls behind says nothing about the vHub. The
-lag of the commits tells whether it did.
+The run is the table without players, at ticks of 5 ms, its physics by the engine `pure`, one substep each: light
+enough for two cores to keep the pace beside the packets, since a run that lags measures nothing of the vHub. The
+lag of the commits shows whether it did.
 
-The lateness has two parts: when the vHub had all that closes the tick (commit and samples; then the run itself is
-late), and what its closing takes up to the release: verdicts, journal, deliveries. Behind the release come message and
+The lateness has two parts: when the vHub had all inputs of the tick's closing (commit and samples; then the run itself
+is late), and the time from its closing up to the release: verdicts, journal, deliveries. After it come message and
 network until the client has it. All times are of one machine's monotonic clock.
 """
 
@@ -42,7 +42,7 @@ MARGIN_S: Final = 5.0
 WARM_NS: Final = 1_000_000_000
 """Of the packets' time, left out: everything runs for the first time."""
 HALF_WINDOW: Final = 500_000_000 // TICK_NS
-"""In ticks, of those among which the promptest is."""
+"""In ticks: the window of the promptest one."""
 P50_MS: Final = 0.5
 P99_MS: Final = 2.0
 
@@ -54,9 +54,9 @@ Quantiles = tuple[float, float, float]
 class Lateness:
     """Release less the end of the tick of arrival, in ms, over all packets that were released to the client.
 
-    Its parts and what comes behind it as p50, p99 and the greatest: `run_ms` until the vHub had all that closes the
-    tick, `closing_ms` from there to the release, `way_ms` from there to the client. `lag_ms` is that of the run's
-    commits behind its own pacing, as the supervisor counts it.
+    Its parts and the time after it as p50, p99 and the greatest: `run_ms` until the vHub had all inputs of the tick's
+    closing, `closing_ms` from there to the release, `way_ms` from there to the client. `lag_ms` is the lag of the run's
+    commits after its own pacing, as the supervisor counts it.
     """
 
     packets: int
@@ -77,7 +77,7 @@ class Lateness:
 
 
 def lateness(seconds: float = 10.0) -> Lateness:
-    """Measure for so many seconds, in real time. Raises BenchError when nothing was released."""
+    """Measure for some seconds, in real time. Raises BenchError when nothing was released."""
     jitter = "{shape: uniform, width: 15 ms}"
     spread = f"{{id: spread, from: '*', to: {NAME}, delay: 5 ms, jitter: {jitter}, order: free}}"
     sets = [*WORLD, f"clients={{{NAME}: {{}}}}", f"network.links=[{spread}]"]

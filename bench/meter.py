@@ -57,7 +57,7 @@ class Meter:
         self._begin_cpu_ns = time.process_time_ns()
 
     def mark(self, tick: int) -> None:
-        """Count up to here; what comes behind the first mark of the last tick is not counted."""
+        """Count up to here; time after the first mark of the last tick is not counted."""
         if tick == self._mark_tick:
             return
         self._mark_ns, self._mark_tick = time.perf_counter_ns(), tick

@@ -33,7 +33,7 @@ class Realtime:
 
 
 def realtime(seconds: float = 60.0) -> Realtime:
-    """Run for so many seconds."""
+    """Run for some seconds."""
     command_s = _command_s()
     run = watch("realtime", seconds, ["tick=2 ms", "substeps=4"], every_s=min(1.0, seconds / 16))
     lag = run.result["lag_ms"]

@@ -1,6 +1,6 @@
 """Runs of real processes, as `foosim up` makes them, watched from here.
 
-The watch stands where the display stands: it sees each status, and at the same time reads what every child has used.
+The watch works as the display does: it sees each status, and at the same time reads what every child has used.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ TABLE: Final = ROOT / "deploy" / "table.yaml"
 LAUNCHER: Final = "launcher"
 ANSWER_S: Final = 30.0
 EAGER_S: Final = 0.02
-"""How often the status is asked for until the first tick is there."""
+"""How often the status is requested until the first tick is there."""
 
 Helpers = Callable[[str, str], Sequence[list[str]]]
 """Gives the command lines of processes that the bench adds, from the addresses of both planes."""
@@ -123,14 +123,14 @@ def uses_of_run() -> dict[str, Use]:
 
 
 def name_of(command: Sequence[str]) -> str:
-    """Return the name of a process in its run, as its command line tells it; empty for any other process."""
+    """Return the name of a process in its run, by its command line; empty for any other process."""
     if "--name" in command[:-1]:
         return command[command.index("--name") + 1]
     programs = [Path(word).name for word in command[:2]]
     return next((name.removeprefix("foosim-") for name in programs if name.startswith("foosim-")), "")
 
 
-def watch(  # what a run may be asked for, by keyword
+def watch(  # parameters of a run, by keyword
     pace: str,
     duration_s: float,
     sets: Sequence[str] = (),
@@ -142,7 +142,7 @@ def watch(  # what a run may be asked for, by keyword
 ) -> Watched:
     """Run a deployment with a capture, with the helpers beside it.
 
-    `read` is given the finished capture. A line on standard error says which run it is and how fast it was: starting
+    `read` is given the finished capture. A line on standard error names the run and its speed: starting
     its processes alone takes a busy machine half a minute.
 
     Raises BenchError when it did not end in order.

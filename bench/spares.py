@@ -38,7 +38,7 @@ class Spares:
 
 
 def spares_text(spares: int, *, are_absent: bool = True) -> str:
-    """Return the deployment of a fleet with so many more robots, in rows beside it."""
+    """Return the deployment of a fleet with `spares` more robots, in rows beside it."""
     data = yaml.safe_load(fleet_text(ROBOTS, is_heard=False))
     for number in range(spares):
         at = {"x": f"{APART_M * (number % 50)} m", "y": f"-{APART_M * (2 + number // 50)} m"}

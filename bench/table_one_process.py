@@ -1,6 +1,6 @@
 """The table in one process: a rehearsal on one node, codec on, without a capture.
 
-Each engine runs bare for the figure, the median of some runs, then metered for where the tick goes. The meter stands in
+Each engine runs bare for the figure, the median of some runs, then metered for the parts of a tick. The meter is in
 the engine and around each process's turns, and costs some microseconds of its own.
 """
 
@@ -114,7 +114,7 @@ def _metered_settings(meter: Meter) -> Settings:
 
 
 class _MeteredPlayer:
-    """A player's core, its reading metered. No settings give its class, and nobody here asks for that."""
+    """A player's core, its reading metered. No settings give its class, and nothing here reads it."""
 
     def __init__(self, core: ClientCore, meter: Meter) -> None:
         self._core = core

@@ -1,4 +1,4 @@
-"""What a verdict with its row costs, on one core: without radio, and with every stage of a Wi-Fi link through walls.
+"""The cost of a verdict with its row, on one core: without radio, and with every stage of a Wi-Fi link through walls.
 
 Endpoints stand in a hall of concrete walls and send to one another, by turns a unicast and a broadcast to three; the
 frame is another one at each tick, so nothing about places is remembered longer than in a run. Judging at sending and at
@@ -73,7 +73,7 @@ Frames = Callable[[int], Frame]
 
 @dataclass(frozen=True, slots=True)
 class Verdicts:
-    """One way: so many endpoints, so many packets judged, what became of them."""
+    """One way: the number of endpoints, the number of judged packets, and their fates."""
 
     way: str
     endpoints: int
@@ -84,7 +84,7 @@ class Verdicts:
 
 
 def verdict(seconds: float = 4.0) -> list[Verdicts]:
-    """Measure each way for so many simulated seconds of 20 packets a tick."""
+    """Measure each way for some simulated seconds of 20 packets a tick."""
     ticks = max(10, round(seconds * 100))
     found = []
     for way, network, count in (("wire", WIRE, 20), ("wifi", WIFI, 20), ("wire", WIRE, 200), ("wifi", WIFI, 200)):
@@ -97,7 +97,7 @@ def verdict(seconds: float = 4.0) -> list[Verdicts]:
 
 
 def standing(network: dict[str, Any], count: int) -> Deployment:
-    """Return the table's hall with so many clients, in rows between walls."""
+    """Return the table's hall with `count` clients, in rows between walls."""
     data = yaml.safe_load(TABLE.read_text())
     names = [f"e{n}" for n in range(count)]
     data["players"], data["clients"] = {}, {name: {} for name in names}
@@ -140,7 +140,7 @@ def circling(deployment: Deployment) -> Frames:
 
 
 def measure(way: str, deployment: Deployment, frames: Frames, names: list[str], ticks: int) -> Verdicts:
-    """Measure so many ticks of what the first of the endpoints `names` send."""
+    """Measure `ticks` ticks of packets from the first of the endpoints `names`."""
     fabric = Fabric(deployment)
     past = [frames(tick) for tick in range(WARM_TICKS + ticks)]
     fates: Counter[str] = Counter()
@@ -183,7 +183,7 @@ def _row(flight: Flight, fates: Counter[str]) -> int:
 
 
 def _offered(tick: int, names: list[str]) -> list[Flight]:
-    """Return what is sent at a tick: by half of the talkers to the next one, by a few to three."""
+    """Return the packets sent at a tick: by half of the talkers to the next one, by a few to three."""
     sent_ns = tick * TICK_NS
     flights = []
     for n in range(tick % 2, TALKERS, 2):
@@ -198,9 +198,9 @@ def _offered(tick: int, names: list[str]) -> list[Flight]:
 
 def lines(rows: list[Verdicts]) -> list[str]:
     """Return the figures for people."""
-    asked = {"wire": "at most 12", "wifi": "at most 20", "rovers": "at most 20"}
+    goals = {"wire": "at most 12", "wifi": "at most 20", "rovers": "at most 20"}
     return [
-        f"{row.way:6}{row.endpoints:5} endpoints {row.us_per_packet:7.1f} us a packet with its row ({asked[row.way]}), "
+        f"{row.way:6}{row.endpoints:5} endpoints {row.us_per_packet:7.1f} us a packet with its row ({goals[row.way]}), "
         f"{row.row_bytes:.0f} bytes of JSON beside it; "
         + ", ".join(f"{cause} {count}" for cause, count in sorted(row.fates.items()))
         for row in rows

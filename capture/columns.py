@@ -137,8 +137,8 @@ class Frames:
     def column(self, entity: str, field: str, count: int = 1) -> Numbers:
         """Return one field of an entity over time: (n,), or (n, count) for the first numbers of a field of several.
 
-        Of a free body `position`, `orientation` and `linear_velocity` are those of the origin of its first link, as on
-        /tf and in its sensors' readings; `CENTRE_OF_SLOT` names those of the link's centre of mass. The numbers are NaN
+        Of a free body `position`, `orientation` and `linear_velocity` are of the origin of its first link, as on
+        /tf and in its sensors' readings; `CENTRE_OF_SLOT` is of the link's centre of mass. The numbers are NaN
         where the entity is absent. Raises CaptureError for an unknown entity or field, and for more numbers than the
         field has.
         """
@@ -153,7 +153,7 @@ class Frames:
         return found[:, 0] if count == 1 else found[:, :count]
 
     def fields(self, entity: str) -> list[str]:
-        """Return the names of an entity's columns, none of an entity that is not there."""
+        """Return the names of an entity's columns, none for an unknown entity."""
         if entity not in self.layout:
             return []
         slots = self.layout[entity].offsets

@@ -66,7 +66,7 @@ def ending_metadata(end: End) -> dict[str, str]:
 
 
 def declare_topics(mcap: McapWriter, readings: Mapping[str, TopicSchema] = NO_READINGS) -> dict[str, int]:
-    """Declare all topics, also those that stay empty; return their channels.
+    """Declare all topics, also empty ones; return their channels.
 
     `readings` are the topics of readings that are shown (`shown_readings.shown_topics`).
     """

@@ -1,7 +1,7 @@
 """Cuts a part out of a capture: a capture of its own, from a captured frame to a time.
 
 The state at that frame is repeated at the start, as it was written: the layout, the epoch, the clients that take part,
-the scene. Deployment, files and metadata are those of the whole; the metadata have the beginning of the cut. A run can
+the scene. Deployment, files and metadata are copied; the metadata have the beginning of the cut. A run can
 begin with any of its frames; a verification starts where the run began, or with the first frame if that is requested.
 """
 
@@ -80,7 +80,7 @@ def cut_capture(path: Path, out: Path, from_ns: int | None = None, to_ns: int | 
 
 
 def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_Start, int, int]:
-    """Return the frame to begin with and what is in force there, the tick in ns, and the last tick."""
+    """Return the frame to begin with and the state in force there, the tick in ns, and the last tick."""
     tick_ns = deployment_of(read_about(path)).tick_ns
     scan = Scan(path)
     start, held = (_Start(ActiveState(str(path))) for _ in range(2))
@@ -88,7 +88,7 @@ def _find_start(path: Path, from_ns: int | None, to_ns: int | None) -> tuple[_St
         if message.topic != FRAME:
             held.take(scan, message)
             if to_ns is not None and start.tick >= 0 and held.tick * tick_ns > to_ns:
-                break  # what is behind may be damaged: it is not needed
+                break  # later messages may be damaged: none of them is needed
         elif start.tick < 0 or (from_ns is not None and held.tick * tick_ns <= from_ns):
             start = replace(held, in_force=held.in_force.copy())
     if start.tick < 0:
@@ -121,7 +121,7 @@ class _Copy:
                 break
 
     def _take(self, scan: Scan, message: Message) -> bool:
-        """Write a message that belongs to the cut; False behind the last one."""
+        """Write a message that belongs to the cut; False after the last one."""
         if message.topic == TICK:
             self._tick = scan.decode(DECODERS[TICK], message).tick
             if self._tick > self._stop_tick:

@@ -1,8 +1,8 @@
 """Compare two captures, channel by channel: the first row of each that differs, in which field, and how many there are.
 
-The typed function behind `foosim capture diff`. Two equal runs differ in what a clock of the real world told, so fields
+The typed function behind `foosim capture diff`. Two equal runs differ in values of the real world's clock, so fields
 whose names begin with `wall_` and the channel `/log` are not compared. Both files are read at once, closing by closing;
-what is held of them is one closing of each and the rows by which a channel of one is ahead.
+the memory holds one closing of each and the rows by which a channel of one is ahead.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ NOTHING: Final = "no such row"
 class Difference:
     """The first difference of a channel: `row` counts its rows from 0, `field` is where in it, with both values.
 
-    `time_ns` is the simulated time at which the row stands, `tick` the tick of that time. `field` is empty where one
+    `time_ns` is the simulated time of the row, `tick` the tick of that time. `field` is empty where one
     capture has no such row.
     """
 
@@ -78,7 +78,7 @@ class Diff:
 
 
 def fields_of_rows() -> set[str]:
-    """Return the names of all fields that rows have, also those of rows within rows."""
+    """Return the names of all fields of rows, also of rows within rows."""
     names = {LOG_TIME, SEQUENCE}
     for kind in ROW_TYPES.values():
         schema = msgspec.json.schema(kind)
@@ -88,7 +88,7 @@ def fields_of_rows() -> set[str]:
 
 
 def check_ignored(ignored: Iterable[str]) -> tuple[frozenset[str], frozenset[str]]:
-    """Return fields and channels that are not to be compared; raises BadValue for a name that no row has."""
+    """Return fields and channels to ignore; raises BadValue for a name that no row has."""
     fields, topics = fields_of_rows(), {*ROW_TYPES, *VIEW_TYPES}
     for name in ignored:
         known = topics if name.startswith("/") else fields
@@ -149,7 +149,7 @@ def _about(a: About, b: About) -> tuple[str, ...]:
 
 
 class _Comparison:
-    """Compares the rows of both sides, and keeps those by which one is ahead."""
+    """Compares the rows of both sides, and keeps the rows by which one is ahead."""
 
     def __init__(self, tick_ns: int, fields: frozenset[str], topics: frozenset[str]) -> None:
         self.channels: dict[str, Channel] = {}
@@ -238,7 +238,7 @@ def _content(message: Message) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a row as plain values with all its fields: a file may leave out those that have their default."""
+    """Return a row as plain values with all its fields: a file may leave out default values."""
     if isinstance(value, msgspec.Struct):
         return {name: _plain(getattr(value, name)) for name in value.__struct_fields__}
     if isinstance(value, list):

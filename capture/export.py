@@ -1,6 +1,6 @@
 """Write a table of a capture to a file: CSV with the standard library, Parquet with pyarrow where it is installed.
 
-The typed function behind `foosim capture export`. The capture is read once, and what is held of the table is one batch.
+The typed function behind `foosim capture export`. The capture is read once, with one batch of the table in memory.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def _sink(table: Table, out: Path, form: Format) -> Iterator[CsvSink | ParquetSi
 
 
 class CsvSink:
-    """CSV in UTF-8 with a line of names: RFC 4180 but for the ends of lines. Bytes are in hex, what is not there empty.
+    """CSV in UTF-8 with a line of names: RFC 4180 but for the ends of lines. Bytes are in hex, missing values empty.
 
     A number is written with the digits that give it back exactly.
     """
@@ -132,9 +132,7 @@ class ParquetSink:
             import pyarrow
             from pyarrow import parquet
         except ImportError:
-            raise NoParquet(
-                "Parquet needs pyarrow, which is not installed: pip install 'foosim[parquet]', or --format csv"
-            ) from None
+            raise NoParquet("Parquet needs pyarrow: pip install 'foosim[parquet]', or --format csv") from None
         self._arrow = pyarrow
         types: dict[Kind, Any] = {
             "integer": pyarrow.int64(),

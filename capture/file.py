@@ -62,7 +62,7 @@ Entry = tuple[str, int, int, int, Row]
 """A row with its place: topic, log time and publish time (simulated ns), sequence number."""
 Encode = Callable[[Row], bytes]
 ONE_FILE: Final = {"split_bytes": None, "split_ns": None, "last_ns": None}
-"""Settings of a capture that is not split."""
+"""Settings of a capture in one file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ Item = Tick | Epoch | Line
 class Described:
     """The capture's description of its run, beside the rows. `metadata` is added to that of the deployment.
 
-    `versions` are those that the run depended on.
+    `versions` are the versions of libraries and components of the run.
     """
 
     deployment: Deployment
@@ -111,7 +111,7 @@ class Described:
 class CaptureFile:
     """One capture on the disk. Raises CaptureError when it exists already, or cannot be written.
 
-    With `journal_tick`, the first tick of a journal, the files that are there are those that this run left unfinished.
+    With `journal_tick`, the first tick of a journal, existing files are the ones that this run left unfinished.
     One without a tick is begun again; a finished one is refused. `begins_next` decides whether the next file begins
     before an item, `begin_next` begins it.
     """
@@ -314,7 +314,7 @@ class CaptureFile:
 
     @property
     def total_bytes(self) -> int:
-        """Size of the capture in bytes, over all its files; while they are joined it grows by what is written."""
+        """Size of the capture in bytes, over all its files; while they are joined it grows with the joined file."""
         several = 0 if self._is_joined else self.mcap.offset + self._split.earlier_bytes
         return several + (0 if self._joined is None else self._joined.mcap.offset)
 
@@ -386,7 +386,7 @@ class CaptureFile:
             self._describe(mcap, own)
             self._repeat(mcap, tick)
             sync_folder(path.parent)
-            self._end({"reason": "goes on", "last_tick": str(self.done.tick), NEXT: path.name})
+            self._end({"reason": "continues", "last_tick": str(self.done.tick), NEXT: path.name})
         except OSError:
             os.close(file)
             path.unlink(missing_ok=True)
@@ -414,7 +414,7 @@ class CaptureFile:
     # --- files that were left unfinished -----------------------------------------------------------------------------
 
     def _follow(self, journal_tick: int) -> None:
-        """Prepare the file after those that were left, if they have a tick."""
+        """Prepare the file after the existing ones, if they have a tick."""
         run = self._described.metadata.get("run", "")
         for path in parts_at(self.path).values():
             if (other := head_of(path).get("run", run)) != run:

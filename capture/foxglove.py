@@ -1,8 +1,8 @@
 """The messages of a capture for viewers: scene, poses and log lines, as Foxglove's Protobuf.
 
 Poses are every link's in the frame `world`, by the one forward kinematics. The scene hangs its shapes on the links
-(`frame_locked`), so it is said once and when others are present. Foxglove, Lichtblick and (but for the scene) rerun
-decode them.
+(`frame_locked`), so it is written once and when other bodies are present. Foxglove, Lichtblick and (but for the scene)
+rerun decode them.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def view_schema(message: Any) -> tuple[str, str, bytes]:
 
 
 class View:
-    """Turns frames into messages for viewers. It remembers who is in the newest scene."""
+    """Turns frames into messages for viewers. It remembers the entities in the newest scene."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment

@@ -18,11 +18,11 @@ from foosim.world.scene import Quaternion, Vector
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _TRANSFORMS: Final = 1
 _CHILD, _TRANSLATION, _ROTATION = 3, 4, 5
-"""Fields of a FrameTransform; those of its vectors are x, y, z (and w) from 1 on."""
+"""Fields of a FrameTransform; its vectors have the fields x, y, z (and w) from 1 on."""
 _LOG_LEVEL, _LOG_TEXT = 2, 3
 _LEVELS: Final = {1: "debug", 2: "info", 3: "warning", 4: "error", 5: "fatal"}
 _NAMES_IN_SCENE: Final = {1: (3,), 2: (2, 3)}
-"""By the field of a SceneUpdate, deletions and entities: those fields of it that name a link."""
+"""By the field of a SceneUpdate, deletions and entities: its fields that name a link."""
 _DOUBLE: Final = struct.Struct("<d")
 
 Content = bytes | int
@@ -38,15 +38,15 @@ class LinkPose:
 
 
 def read_poses(data: bytes) -> list[LinkPose]:
-    """Return the links of a FrameTransforms message, in its order. Raises CaptureError for what is none."""
+    """Return the links of a FrameTransforms message, in its order. Raises CaptureError for any other content."""
     try:
         return [_link_pose(content) for number, content in _fields(data) if number == _TRANSFORMS]
-    except (ValueError, IndexError, struct.error) as error:  # a text that is no UTF-8 is a ValueError
+    except (ValueError, IndexError, struct.error) as error:  # invalid UTF-8 is a ValueError
         raise CaptureError(f"poses that cannot be read: {error}") from None
 
 
 def read_log(data: bytes) -> tuple[str, str]:
-    """Return level and text of a Log message. Raises CaptureError for what is none."""
+    """Return level and text of a Log message. Raises CaptureError for any other content."""
     level, text = "info", ""
     try:
         for number, content in _fields(data):
@@ -60,7 +60,7 @@ def read_log(data: bytes) -> tuple[str, str]:
 
 
 def renamed_scene(data: bytes, rename: Callable[[str], str]) -> bytes:
-    """Return a SceneUpdate message with other names of links. Raises CaptureError for what is none."""
+    """Return a SceneUpdate message with other names of links. Raises CaptureError for any other content."""
 
     def named(content: bytes) -> bytes:
         return rename(content.decode()).encode()
@@ -113,7 +113,7 @@ def _link_pose(content: Content) -> LinkPose:
 
 
 def _read_doubles(data: bytes, numbers: list[float]) -> None:
-    """Write the doubles of a vector's message into `numbers`; those that are 0 are left out of it."""
+    """Write the doubles of a vector's message into `numbers`; a message leaves out zeros."""
     for number, value in _fields(data):
         if 1 <= number <= len(numbers):
             (numbers[number - 1],) = _DOUBLE.unpack(_bytes(value))

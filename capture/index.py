@@ -198,7 +198,7 @@ class CaptureIndex:
             start = at + RECORD.size
             _, sequence, log_ns, publish_ns = MESSAGE_FIELDS.unpack_from(chunk, start)
         except struct.error as error:
-            raise self._damaged(places.chunk[number], f"its index leads behind its end, {error}") from None
+            raise self._damaged(places.chunk[number], f"its index leads beyond its end, {error}") from None
         data = chunk[start + MESSAGE_FIELDS.size : start + length]
         return Message(topic, log_ns, publish_ns, sequence, data)
 
@@ -240,7 +240,7 @@ class CaptureIndex:
                 self._walk(part, content, size)
 
     def _walk(self, part: _Part, content: memoryview, size: int) -> None:
-        """Take the whole records behind those that were taken."""
+        """Take the whole records after the taken ones."""
         if not part.done:
             if bytes(content[: len(MAGIC)]) != MAGIC:
                 raise CaptureError(f"{part.path}: no MCAP file, it does not start with {MAGIC!r}")
@@ -268,7 +268,7 @@ class CaptureIndex:
                 )
 
     def _take(self, part: _Part, opcode: int, content: bytes, length: int) -> None:
-        """Take a record of so many bytes; of a chunk `content` is the head alone."""
+        """Take a record of `length` bytes; of a chunk `content` is the head alone."""
         if opcode == Opcode.CHANNEL:
             self._declare(part, content)
         elif opcode == Opcode.CHUNK:
@@ -284,7 +284,7 @@ class CaptureIndex:
         elif opcode == Opcode.MESSAGE_INDEX:
             channel, size = INDEX_FIELDS.unpack_from(content)
             if channel not in part.names or part.last < 0:
-                raise ValueError(f"an index of channel {channel}, which is not declared")
+                raise ValueError(f"an index of channel {channel}, which is undeclared")
             self._topics_in[-1].add(part.names[channel])
             if channel not in part.taken:
                 pairs = array("Q")
@@ -314,7 +314,7 @@ class CaptureIndex:
             places.chunk.fromlist([part.last] * (len(pairs) // 2))
 
     def _complete(self, part: _Part) -> None:
-        """Take what the indexes of the last chunk have not told: it has none, or they are still to be written."""
+        """Take what the indexes of the last chunk lack: it has none, or they are still to be written."""
         missing = part.topics.keys() - part.taken
         if part.last < 0 or not missing:
             return
@@ -356,4 +356,4 @@ def _end_of_whole(stream: BinaryIO, chunk: Chunk) -> int:
         size = len(pairs) * pairs.itemsize
         expected += RECORD.pack(Opcode.MESSAGE_INDEX, INDEX_FIELDS.size + size)
         expected += INDEX_FIELDS.pack(channel, size) + pairs.tobytes()
-    return stream.tell() if stream.read(len(expected)) == expected else -1
+    return chunk.offset + chunk.length + len(expected) if stream.read(len(expected)) == expected else -1

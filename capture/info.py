@@ -25,9 +25,9 @@ from foosim.world.frame import CHAIN_START, chain_next
 class CaptureInfo:
     """A capture in short, for people and scripts. Digests are hex; `packets` counts fates, `causes` drops by cause.
 
-    `first_tick` is that of the first frame that it has, which its run began with unless it is a cut, `ticks` that of
-    the last one. `nodes` and `clients` are those that took part; `arithmetic` has each digest of a fixed small run of
-    the nodes' engine. `recoveries` counts losses and returns. `files` are those of the deployment, with their bytes.
+    `first_tick` is the tick of its first frame, with which its run began unless it is a cut, `ticks` the tick of
+    its last one. `nodes` and `clients` took part in the run; `arithmetic` has each digest of a fixed small run of
+    the nodes' engine. `recoveries` counts losses and returns. `files` are the deployment's files, with their bytes.
     """
 
     path: str

@@ -33,7 +33,7 @@ class Left:
     """An unfinished capture: its last file with its number, and the state at its end.
 
     `stop` is the end of the last whole chunk of that file, None where the file has its end and the next one is missing.
-    `torn_bytes` follow it. `rows` counts those of ticks, packets, epochs and the log.
+    `torn_bytes` follow it. `rows` counts rows of ticks, packets, epochs and the log.
     """
 
     path: Path
@@ -49,7 +49,7 @@ class Left:
 def find_left(path: Path) -> Left | None:
     """Return what the capture that begins at `path` has; None where it has no tick, and is begun again.
 
-    Raises CaptureError for a finished one, and for a file that is no capture.
+    Raises CaptureError for a finished one, and for other files.
     """
     if not parts_at(path):
         return None

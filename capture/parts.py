@@ -27,20 +27,20 @@ from foosim.capture.mcap.checks import CHECKS, CaptureError, compare, read_metad
 from foosim.capture.mcap.format import MAGIC, RECORD, Content, Damaged, McapFile, Message, chunk_records
 
 FOOTER: Final = struct.Struct("<BQQQI8s")
-"""The last record of an MCAP file, and the magic bytes behind it."""
-_BEHIND_FOOTER: Final = 4 + len(MAGIC)
-"""Its checksum, which is over the bytes before it, and those bytes."""
+"""The last record of an MCAP file, and the magic bytes after it."""
+_AFTER_FOOTER: Final = 4 + len(MAGIC)
+"""Its checksum, which is over the bytes before it, and the magic bytes."""
 METADATA: Final = "foosim"
 END_METADATA: Final = "foosim.end"
 PART, AFTER, LAST = "part", "part_after", "last"
 """Entries of the metadata `foosim` of a file of several: its number from 0, the file before, and the time that is kept
 where only the last is."""
 AFTER_BYTES: Final = "part_after_bytes"
-"""Entry of a file that a restarted writer began: the bytes that count of the file before, which has no end."""
+"""Entry of a file that a restarted writer began: the bytes that count of the file before, which lacks its end."""
 ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN = "from", "from_tick", "from_digest", "from_chain"
 """Where the run of a capture began, when not with frame 0: entries of the metadata `foosim`."""
-NEXT: Final = "goes_on_in"
-"""The file behind one: an entry of the metadata `foosim.end`."""
+NEXT: Final = "continues_in"
+"""The next file: an entry of the metadata `foosim.end`."""
 FAILED_RUN: Final = "failed"
 """An entry there where the run failed."""
 
@@ -60,7 +60,7 @@ def first_path(path: Path, number: int) -> Path | None:
 
 
 def parts_at(path: Path) -> dict[int, Path]:
-    """Return the files that are called as those of the capture that begins at `path`, by their number, ascending."""
+    """Return the files named as parts of the capture that begins at `path`, by their number, ascending."""
     form = re.compile(rf"{re.escape(path.stem)}_(\d{{4,}}){re.escape(path.suffix)}")
     found = {0: path} if os.path.lexists(path) else {}
     try:
@@ -128,12 +128,12 @@ def whole_path(path: Path) -> Path:
 
 
 def files_from(path: Path) -> list[Path]:
-    """Return a file and those that follow, as `parts_from` does."""
+    """Return a file and the ones that follow, as `parts_from` does."""
     return [part.path for part in parts_from(path)]
 
 
 def parts_from(path: Path) -> list[Part]:
-    """Return a file and those that follow. If the first was removed (`capture.last`), the first that is left.
+    """Return a file and the ones that follow. If the first was removed (`capture.last`), the first that is left.
 
     Raises CaptureError when one of them is missing, or is of another run.
     """
@@ -175,12 +175,12 @@ def end_of(path: Path) -> dict[str, str] | None:
             tail = stream.read(FOOTER.size)
             if len(tail) < FOOTER.size or not tail.endswith(MAGIC):
                 return None
-            opcode, _, start, _, told, _ = FOOTER.unpack(tail)
+            opcode, _, start, _, written, _ = FOOTER.unpack(tail)
             if opcode != Opcode.FOOTER or start > footer:
                 raise ValueError("it does not end with a footer")
             stream.seek(start)
             summary = stream.read(footer - start) if start else b""
-            compare("all of it", crc32(tail[:-_BEHIND_FOOTER], crc32(summary)), told)
+            compare("all of it", crc32(tail[:-_AFTER_FOOTER], crc32(summary)), written)
             return _end_in(stream, summary, size)
     except (EndOfFile, struct.error, ValueError) as error:
         raise Damaged(f"{path}: a damaged summary, {error}") from None
@@ -216,10 +216,10 @@ def _end_in(stream: BinaryIO, summary: bytes, size: int) -> dict[str, str]:
 
 
 class Joined:
-    """Reads a file and those behind it as one MCAP file, from start to end; else as `McapFile` does."""
+    """Reads a file and the next ones as one MCAP file, from start to end; else as `McapFile` does."""
 
     def __init__(self, path: Path, since_ns: int = 0, topics: frozenset[str] | None = None) -> None:
-        """`since_ns`: what was recorded long before that time is passed by, if it can be; so are other topics."""
+        """`since_ns`: chunks from long before that time are skipped, if possible; so are other topics."""
         self.finished = False
         """Whether the last of them has an end."""
         self.unfinished_bytes = 0

@@ -1,8 +1,8 @@
 """The reader of captures: a finished or an unfinished file as numpy arrays, and the inputs of a re-simulation.
 
-A file is read from start to end, with no more of it in memory than a chunk and the columns that are asked for: frames,
-packets and rows are read when they are used. What is damaged or is no capture raises `CaptureError`; a file whose
-writer was killed gives everything up to its last whole chunk, and says so.
+A file is read from start to end, with at most a chunk and the requested columns in memory: frames, packets and rows
+are read when they are used. A damaged file, or a file of another format, raises `CaptureError`; a file whose
+writer was killed gives everything up to its last whole chunk, and reports that.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class Scan:
         self._since_ns = since_ns
 
     def messages(self, topics: frozenset[str] | None = None) -> Iterator[Message]:
-        """Yield the messages of some topics (None: all), from the first on behind the checked metadata."""
+        """Yield the messages of some topics (None: all), from the first one after the checked metadata."""
         file = Joined(self._path, self._since_ns, topics)
         self.about.chunk_starts = file.chunk_starts
         checked = False
@@ -189,7 +189,7 @@ class Scan:
         return row_of(decoder, message, f"{self._path}: ")
 
     def _check(self, file: Joined) -> None:
-        """Refuse a file that is no capture, or one of another format, before its rows are read."""
+        """Refuse other files, and captures of another format, before rows are read."""
         if file.profile != PROFILE or not self.about.metadata:
             raise CaptureError(f"{self._path}: no capture of foosim, its profile is {file.profile!r}, not {PROFILE!r}")
         found = self.about.metadata.get("format", "")
@@ -227,7 +227,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class CaptureData:
-    """A capture, opened. Packets and frames are read when they are asked for, rows each time from the file."""
+    """A capture, opened. Packets and frames are read at their first use, rows each time from the file."""
 
     about: About
     deployment: Deployment
@@ -343,7 +343,7 @@ def open_capture(path: Path | str) -> CaptureData:
         if message.topic == TICK:
             mark = scan.decode(TICK_MARKS, message)
             if ticks and mark.tick <= ticks[-1]:
-                raise CaptureError(f"{path}: tick {mark.tick} comes behind tick {ticks[-1]}")
+                raise CaptureError(f"{path}: tick {mark.tick} follows tick {ticks[-1]}")
             ticks.append(mark.tick)
             digests += bytes.fromhex(mark.digest)
             edit_kinds.update(edit.kind for edit in mark.edits)
@@ -402,19 +402,19 @@ def origin_of(about: About) -> Origin | None:
         digest, chain = bytes.fromhex(about_it[ORIGIN_DIGEST]), bytes.fromhex(about_it[ORIGIN_CHAIN])
         return Origin(int(about_it[ORIGIN_TICK]), about_it[ORIGIN], digest, chain)
     except (KeyError, ValueError) as error:
-        raise CaptureError(f"{about.path}: it does not say in full where its run began: {error}") from None
+        raise CaptureError(f"{about.path}: its record of where its run began is incomplete: {error}") from None
 
 
 def beginning_of(about: About) -> Origin | None:
     """Return where a capture begins, a cut or its run, None: at frame 0. Raises CaptureError."""
-    told = about.metadata
-    if CUT not in told:
+    entries = about.metadata
+    if CUT not in entries:
         return origin_of(about)
     try:
-        digest, chain = bytes.fromhex(told[CUT_DIGEST]), bytes.fromhex(told[CUT_CHAIN])
-        return Origin(int(told[CUT_TICK]), told[CUT], digest, chain)
+        digest, chain = bytes.fromhex(entries[CUT_DIGEST]), bytes.fromhex(entries[CUT_CHAIN])
+        return Origin(int(entries[CUT_TICK]), entries[CUT], digest, chain)
     except (KeyError, ValueError) as error:
-        raise CaptureError(f"{about.path}: it does not say in full where it was cut: {error}") from None
+        raise CaptureError(f"{about.path}: its record of where it was cut is incomplete: {error}") from None
 
 
 def chain_at_start(about: About) -> bytes:
@@ -443,6 +443,6 @@ def check_layout(path: Path, layout: Layout, row: LayoutRow) -> None:
 
 
 def check_frame(path: Path, layout: Layout, row: FrameRow) -> None:
-    """Raise CaptureError for a row of a frame that is not of a layout."""
+    """Raise CaptureError for a row of a frame of another layout."""
     if len(row.values) != 8 * layout.size or any(box.index >= len(layout.entities) for box in row.outboxes):
         raise CaptureError(f"{path}: frame {row.tick} does not fit its layout of {layout.size} numbers")

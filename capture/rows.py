@@ -2,7 +2,7 @@
 
 A row is a JSON object; its JSON Schema is generated from its type. Viewers (Foxglove, Lichtblick) parse only a part of
 JSON Schema: objects of numbers, strings, booleans, objects and lists of these; no null, no choice between types, no
-reference, no list in a list. So a row has every field always, and -1 or an empty text where there is nothing to say.
+reference, no list in a list. So a row has every field always, and -1 or an empty text for a missing value.
 Fields that come from a clock of the real world have names that start with `wall_`: two runs differ in them.
 """
 
@@ -103,7 +103,7 @@ class OutboxRow(Row, frozen=True, omit_defaults=True):
 
 
 class FrameRow(Row, frozen=True):
-    """Frame `tick` itself: its values as little-endian float64, its outboxes that are not empty."""
+    """Frame `tick` itself: its values as little-endian float64, its non-empty outboxes."""
 
     tick: Counter
     values: bytes
@@ -259,7 +259,7 @@ class EpochRow(Row, frozen=True):
 
 
 class RecoveryRow(Row, frozen=True):
-    """A process that was lost or came behind frame `tick`, and the `epoch` that is the first without or with it.
+    """A process that was lost or came after frame `tick`, and the `epoch` that is the first without or with it.
 
     `what` is `node` (a node was lost), `join` (one came), `supervisor` (it was started again), `vhub` (it was lost,
     and is back), `player` (a new process continues for one that was lost), `away` (the run continues without a player

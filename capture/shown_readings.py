@@ -1,5 +1,5 @@
-"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`forms.shown`), of any other sensor
-that is not foosim's own as JSON.
+"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`forms.shown`), of any other
+sensor from a plug-in as JSON.
 
 Each of them has a topic, `/readings/ROBOT/CHANNEL`. A message is the reading as the robot sent it: after modifiers,
 before the network.
@@ -85,7 +85,7 @@ class ShownReadings:
     def messages(self, tick: int, packets: Iterable[RobotPacket]) -> Iterator[tuple[str, bytes]]:
         """Yield topic and message of each of the robots' packets at a tick that is such a reading.
 
-        A payload that is no reading of its sensor has none.
+        An invalid payload of its sensor has none.
         """
         at = Timestamp(*divmod(tick * self._tick_ns, _SECOND_NS))
         for packet in packets:

@@ -1,7 +1,7 @@
 """The files of a capture that is written: when the next one begins, its metadata, and which old files are removed.
 
 By size or time a file begins with a captured frame that would be there anyway. A restarted writer begins one with the
-last frame that is there, which the first chunk repeats. So all rows of all files are those of one file.
+last existing frame, which the first chunk repeats. So all rows of all files are the rows of one file.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Split:
         return sum(file.bytes for file in self._earlier)
 
     def follow(self, left: Left) -> None:
-        """Continue with the file after those that were left. Raises CaptureError for an invalid one."""
+        """Continue with the file after the existing ones. Raises CaptureError for an invalid one."""
         for number, path in parts_at(self._path).items():
             if number <= left.number:
                 head = head_of(path)

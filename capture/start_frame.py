@@ -1,6 +1,6 @@
 """A frame of a capture as the start of another run: `CAPTURE@12.5s` or `CAPTURE@last`, and its checks.
 
-A branch begins with the newest captured frame at or before the time, keeps its tick, and goes on from the chain over
+A branch begins with the newest captured frame at or before the time, keeps its tick, and continues the chain over
 all frames up to it: with the inputs of the captured run it has the digests of the captured run.
 """
 
@@ -52,13 +52,13 @@ def parse_branch(text: str) -> tuple[Path, int | None]:
     try:
         return Path(path), parse_ns(time)
     except BadValue as error:
-        raise BadValue(f"--from: the time behind @, {error.problem}", error.value, error.nearest) from None
+        raise BadValue(f"--from: the time after @, {error.problem}", error.value, error.nearest) from None
 
 
 def read_branch(text: str, deployment: Deployment) -> Branch:
-    """Return the start that `CAPTURE@TIME` means, for a run of `deployment`.
+    """Return the start that `CAPTURE@TIME` names, for a run of `deployment`.
 
-    Raises BadBranch for a file that is no capture, BadValue for a time that it does not have and for a deployment that
+    Raises BadBranch for a file other than a capture, BadValue for a time beyond it and for a deployment that
     does not fit it.
     """
     path, at_ns = parse_branch(text)
@@ -130,7 +130,7 @@ def _find(path: Path, at_ns: int | None) -> _Found:
 
 
 def branch_command(arguments: Sequence[str], capture: Path | None) -> str:
-    """Return in words how a new run begins with the last captured frame; `arguments` are those of the run before."""
+    """Return in words how a new run begins with the last captured frame; `arguments` are the last run's."""
     try:
         has_frame = capture is None or any(True for _ in Scan(capture).messages(frozenset({FRAME})))
     except Refused as error:

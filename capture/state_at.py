@@ -22,7 +22,7 @@ _decoder: Final = msgspec.json.Decoder(ClientRow)
 
 
 class ActiveState:
-    """The messages of a capture that are in force after those that it took. `name` is the capture's, for errors."""
+    """The messages of a capture that are in force after the taken ones. `name` is the capture's, for errors."""
 
     def __init__(self, name: str) -> None:
         self._name = name

@@ -1,8 +1,8 @@
-"""What a capture gives as tables: columns with types and units, and the values of a message as rows of a table.
+"""The tables of a capture: columns with types and units, and the values of a message as rows of a table.
 
-Every kind of row is a table by itself, made from its type: a field is a column, and what is a list or a structure is
-JSON in a text. Beside them are `poses`, a row for each link and message of /tf, and `commands`, the packets that were
-to move robots, with their numbers. Integers (times in ns, ticks, sequence numbers) are 64-bit and never rounded.
+Every type of row is a table: a field is a column, and a list or a structure is
+JSON in a text. Beside them are `poses`, a row for each link and message of /tf, and `commands`, the packets with
+commands of robots, with their numbers. Integers (times in ns, ticks, sequence numbers) are 64-bit and never rounded.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One table: the topic that it is made from, its columns, and the rows that a message of it gives."""
+    """One table: its topic, its columns, and the rows that a message of the topic gives."""
 
     name: str
     topic: str
@@ -83,7 +83,7 @@ def unit_of(name: str) -> str:
 
 
 def table_names() -> list[str]:
-    """Return what can be exported, what people ask for first."""
+    """Return the names of the tables, the most used first."""
     rows = [topic.removeprefix("/") for topic in ROW_TYPES]
     first = [PACKETS.removeprefix("/"), POSES_TABLE, COMMANDS_TABLE]
     return [*first, *(name for name in rows if name not in first)]
@@ -125,7 +125,7 @@ def _columns(kind: type[Row]) -> tuple[Column, ...]:
 
 
 def _values(row: Row, json: Iterable[int]) -> list[Any]:
-    """Return the values of a row in the order of its columns; `json` are the places of those that are JSON."""
+    """Return the values of a row in the order of its columns; `json` are the places of values written as JSON."""
     values = list(msgspec.structs.astuple(row))
     for place in json:
         values[place] = encode_json(values[place]).decode()
@@ -196,7 +196,7 @@ _COMMAND_FIELDS: Final = (
 def _value_columns(deployment: Deployment) -> dict[str, Column]:
     """Return the columns of the fields of all commands of a deployment's robots, in the order of their kinds.
 
-    Of what is not one number the value is JSON. A field that is called as a column of packets begins with `command_`.
+    A value other than one number is JSON. A field with the name of a column of packets begins with `command_`.
     """
     kinds = {its.kind: its.component_type for robot in deployment.robots.values() for its in robot.actuators.values()}
     found: dict[str, Column] = {}

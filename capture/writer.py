@@ -1,10 +1,10 @@
 """The writer of a capture: a thread that writes the rows of journalled closings, and never loses one silently.
 
 `keep` hands a closing over and returns; when the writer lags by more than the queue holds, `keep` waits, which slows
-the run, and says so once. What is written is flushed at least every `capture.flush`, synced each second by a thread of
-its own, and readable when the process is killed. When the room gets little (`protocol.disk`) or the disk refuses,
-`state` says so; the owner ends the run, or goes on without a capture, as the deployment wants it. A writer that has
-given up has an end in its file and counts what it refuses: offered = written + refused.
+the run, and logs that once. Rows are flushed at least every `capture.flush`, synced each second by a thread of
+its own, and readable when the process is killed. When disk space is low (`protocol.disk`) or the disk refuses,
+`state` has the reason; the owner ends the run, or continues without a capture, as the deployment wants it. A writer
+that has given up has an end in its file and counts refused rows: offered = written + refused.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class CaptureWriter:
 
     Raises CaptureError when the file exists already (it is never overwritten) or cannot be written. With `journal_tick`
     it continues a capture that this run left unfinished (`CaptureFile`): `put` everything that the journal has, from
-    that tick on; what is in the capture is not written again. `say` takes messages for people as (level, text).
+    that tick on; captured rows are not written again. `say` takes messages for people as (level, text).
     `put`, `log`, `finish` and `leave` are for one thread.
     """
 
@@ -82,7 +82,7 @@ class CaptureWriter:
         two readings."""
         self.stops_world = described.deployment.capture.on_full == "stop_world"
         self._offered = self._written = self._refused = self._pending = self._passed = 0
-        """Rows by their end, with those that a resumed capture has; pending ones are in the chunk that is being
+        """Rows by their end, with the rows of a resumed capture; pending ones are in the chunk that is being
         collected, passed ones came again."""
         self._error: BaseException | None = None
         self._queue: deque[Item] = deque()
@@ -227,7 +227,7 @@ class CaptureWriter:
                 self._flush()
                 flush_at_ns = now_ns + interval_ns
             if now_ns >= sync_at_ns and self._syncer.lags and not self._pending:
-                self._syncer.ask()
+                self._syncer.request()
                 sync_at_ns = now_ns + SYNC_NS
         if self._ending is None:
             self._flush()
@@ -341,7 +341,7 @@ class _Syncer:
         self.error: OSError | None = None
         self._file = file
         self._written = -1
-        self._asked: SimpleQueue[int | None] = SimpleQueue()
+        self._requests: SimpleQueue[int | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="capture-sync", daemon=True)
         self._thread.start()
 
@@ -350,18 +350,18 @@ class _Syncer:
         self._written = tick
         self.lags = True
 
-    def ask(self) -> None:
+    def request(self) -> None:
         """Request a sync; return at once."""
         self.lags = False
-        self._asked.put(self._written)
+        self._requests.put(self._written)
 
     def end(self) -> None:
         """Wait for requested syncs, and end the thread; a second call does nothing."""
-        self._asked.put(None)
+        self._requests.put(None)
         self._thread.join()
 
     def _run(self) -> None:
-        while (tick := self._asked.get()) is not None:
+        while (tick := self._requests.get()) is not None:
             try:
                 self._file.sync()
                 self.tick = tick

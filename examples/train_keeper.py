@@ -82,20 +82,20 @@ def mean_reward(weights: Numbers, seeds: Sequence[int]) -> float:
     return total / len(seeds)
 
 
-def train(pool: Executor, asked: argparse.Namespace) -> tuple[Numbers, list[float]]:
+def train(pool: Executor, chosen: argparse.Namespace) -> tuple[Numbers, list[float]]:
     """Return the weights that are kept, and the mean rewards of the trials: at the start, after each generation."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # cma says that it cannot draw without matplotlib
+        warnings.simplefilter("ignore")  # cma warns that it cannot draw without matplotlib
         from cma import CMAEvolutionStrategy
-    options = {"seed": asked.seed + 1, "popsize": asked.policies, "verbose": -9}
+    options = {"seed": chosen.seed + 1, "popsize": chosen.policies, "verbose": -9}
     strategy, best = CMAEvolutionStrategy(np.zeros(WEIGHTS), 0.3, options), np.zeros(WEIGHTS)
-    trials = range(FIRST_TRIAL, FIRST_TRIAL + asked.trials)
+    trials = range(FIRST_TRIAL, FIRST_TRIAL + chosen.trials)
     rewards = [mean_reward(best, trials)]
     print(f"standing still: mean reward {rewards[0]:+.2f}", flush=True)
-    for generation in range(1, asked.generations + 1):
-        first = 10_000_000 * asked.seed + generation * asked.shots
+    for generation in range(1, chosen.generations + 1):
+        first = 10_000_000 * chosen.seed + generation * chosen.shots
         policies = strategy.ask()
-        tried = pool.map(mean_reward, policies, [range(first, first + asked.shots)] * len(policies))
+        tried = pool.map(mean_reward, policies, [range(first, first + chosen.shots)] * len(policies))
         strategy.tell(policies, [-reward for reward in tried])
         rewards.append(mean_reward(strategy.mean, trials))
         if rewards[-1] >= max(rewards):
@@ -143,14 +143,14 @@ def main(arguments: Sequence[str] | None = None) -> list[float]:
     parser.add_argument("--seed", type=int, default=1, help="of the shots and of the policies that are tried (1)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="number of processes; changes no result")
     parser.add_argument("--minutes", type=float, default=1.0, help="simulated length of each match (1)")
-    asked = parser.parse_args(arguments)
-    with ProcessPoolExecutor(asked.jobs, multiprocessing.get_context("spawn")) as pool:
-        best, rewards = train(pool, asked)
-        asked.out.write_text(json.dumps(best.tolist()))
-        print(f"kept: mean reward {max(rewards):+.2f}, in {asked.out}", flush=True)
-        trained = ("train_keeper:Keeper", {"weights": str(asked.out.absolute())})
+    chosen = parser.parse_args(arguments)
+    with ProcessPoolExecutor(chosen.jobs, multiprocessing.get_context("spawn")) as pool:
+        best, rewards = train(pool, chosen)
+        chosen.out.write_text(json.dumps(best.tolist()))
+        print(f"kept: mean reward {max(rewards):+.2f}, in {chosen.out}", flush=True)
+        trained = ("train_keeper:Keeper", {"weights": str(chosen.out.absolute())})
         players = {"standing still": ("foosim.library.table.players.football:Passive", {}), "trained": trained}
-        scores = pool.map(match, *zip(*players.values(), strict=True), [asked.minutes] * len(players))
+        scores = pool.map(match, *zip(*players.values(), strict=True), [chosen.minutes] * len(players))
         for name, score in zip(players, scores, strict=True):
             print(f"{name} against the shipped keeper: {score}")
     return rewards

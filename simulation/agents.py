@@ -29,10 +29,10 @@ def agents_of(deployment: Deployment) -> list[str]:
 
 
 class Agent:
-    """Whom the caller speaks for: the robots that it commands, what it hears, and the newest of that."""
+    """A player that the caller controls: its robots, what it hears, and the newest readings of that."""
 
     def __init__(self, deployment: Deployment, name: str) -> None:
-        """Raises UnknownName for what is neither a player nor `learner`."""
+        """Raises UnknownName for another name than a player's or `learner`."""
         self.name = name
         player = deployment.players.get(name)
         if player is not None:

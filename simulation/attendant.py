@@ -72,7 +72,7 @@ class Onlooker:
         return line
 
     def overdue(self, at_work: AtWork) -> str:
-        """Return a message about a player that has not returned within its deadline; empty when none is overdue."""
+        """Return a message about a player at work beyond its deadline; empty when none is overdue."""
         deadlines = self._state.deployment.deadlines
         is_first = at_work.tick < 0
         allowed_ns = deadlines.start_ns if is_first else deadlines.lockstep_fast_ns

@@ -1,4 +1,4 @@
-"""What carries packets between robots and those who step a world: the emulated network, or nothing in between.
+"""Carriers of packets between robots and the clients of a stepped world: the emulated network, or a direct one.
 
 A carrier is opened at each frame, with what the robots send, and closed, with what clients answer. Members are clients
 that take part, by the classes of the vHub, so a player is due at the ticks at which it is due in a run.
@@ -94,7 +94,7 @@ class Bypass:
         self._turns = {one.name: frozenset((s, c) for s, c in one.arrivals) for one in joining if one.arrivals}
 
     def open(self, frame: Frame, packets: Sequence[RobotPacket], events: Sequence[Disrupt]) -> list[str]:
-        """Hand readings to those who subscribe to them."""
+        """Hand readings to their subscribers."""
         assert not events, "there is no network to which something could happen"
         tick = frame.tick
         if self._joining:

@@ -31,10 +31,10 @@ _EVENT: Final = re.compile(
 
 
 class Events:
-    """The events of one rehearsal: `prepare` schedules them, `check` says afterwards which did not happen."""
+    """The events of one rehearsal: `prepare` schedules them, `check` reports afterwards which did not happen."""
 
     def __init__(self, texts: Sequence[str], deployment: Deployment, nodes: int) -> None:
-        """Raises BadValue for a text that is no event, UnknownName for a name in it."""
+        """Raises BadValue for an invalid event, UnknownName for a name in it."""
         here = [f"n{number + 1}" for number in range(nodes)]
         self._names: dict[str, tuple[str, list[str]]] = {
             "process": ("node or player", [*here, *deployment.players]),
@@ -45,8 +45,8 @@ class Events:
         self._tick_ns = deployment.tick_ns
         self._due = [(text, *self._read(text)) for text in texts]
         self._left = dict.fromkeys(texts, "the rehearsal ended before")
-        """Why each that has not happened has not."""
-        self._asked: dict[str, str] = {}
+        """Of each outstanding event: why it has not happened."""
+        self._requests: dict[str, str] = {}
         """The event of each request, by its id."""
 
     def _read(self, text: str) -> tuple[int, Callable[[System, str], None]]:
@@ -73,7 +73,7 @@ class Events:
 
     def check(self, answers: Mapping[str, Answer]) -> None:
         """Raise BadValue for an event that did not happen, after the rehearsal whose answers these are."""
-        for identity, text in self._asked.items():
+        for identity, text in self._requests.items():
             if identity in answers:
                 answer = answers[identity]
                 self._left[text] = "" if answer.accepted else answer.text
@@ -82,7 +82,7 @@ class Events:
                 raise BadValue(f"this event did not happen: {why}", text)
 
     def _move(self, robot: str, node: str, system: System, text: str) -> None:
-        self._asked[system.request("move", again_ns=AGAIN_NS, robot=robot, node=node)] = text
+        self._requests[system.request("move", again_ns=AGAIN_NS, robot=robot, node=node)] = text
 
     def _cut(self, node: str, for_ns: int, system: System, text: str) -> None:
         self._left[text] = ""

@@ -9,7 +9,7 @@ from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import HeadRecord, HubRecord
 from foosim.vhub.state.resume import Captured, Past, recall
 
-Ending = Literal["now", "torn", "unsaid"]
+Ending = Literal["now", "torn", "unpublished"]
 """When a vHub dies: at once; during its next write, which leaves a torn record; after it, before publishing."""
 ENDINGS: Final[tuple[Ending, ...]] = get_args(Ending)
 HEADS_KEPT: Final = 5
@@ -29,7 +29,7 @@ class HubJournal:
         self.heads: list[int] = []
 
     def append(self, record: bytes) -> None:
-        """Write a record; drop those that no fold needs."""
+        """Write a record; drop the ones that no fold needs."""
         if isinstance(decode_any(HubRecord, record), HeadRecord):
             self.heads.append(len(self.records))
             if len(self.heads) > HEADS_KEPT:

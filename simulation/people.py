@@ -20,7 +20,7 @@ class People:
 
     def __init__(self, bus: Bus, later: Callable[[int, Callable[[], object]], None]) -> None:
         self.answers: dict[str, Answer] = {}
-        self.asked: dict[str, str] = {}
+        self.verbs: dict[str, str] = {}
         """The verb of each request that was not given up, by id."""
         self._bus = bus
         self._later = later
@@ -38,16 +38,16 @@ class People:
         """
         self._requests += 1
         identity = f"request-{self._requests}"
-        self.asked[identity] = verb
+        self.verbs[identity] = verb
         kind, channel = (Inquiry, channels.INQUIRY) if only_looks else (Request, channels.REQUEST)
         self._bus.subscribe(who, channels.OPERATOR_READS)
-        self._ask(identity, channel, who, encode(kind(who, identity, verb, encode_json(arguments))), again_ns)
+        self._send(identity, channel, who, encode(kind(who, identity, verb, encode_json(arguments))), again_ns)
         return identity
 
     def give_up(self, verb: str) -> None:
         """Stop repeating unanswered requests."""
-        for identity in [known for known, what in self.asked.items() if what == verb and known not in self.answers]:
-            self.asked.pop(identity)
+        for identity in [known for known, what in self.verbs.items() if what == verb and known not in self.answers]:
+            self.verbs.pop(identity)
 
     def hear(self, channel: Channel, payload: bytes) -> None:
         """Handle an answer or a view."""
@@ -57,9 +57,9 @@ class People:
             answer = decode(Answer, payload)
             self.answers[answer.id] = answer
 
-    def _ask(self, identity: str, channel: Channel, who: str, payload: bytes, again_ns: int) -> None:
-        if identity in self.answers or identity not in self.asked:
+    def _send(self, identity: str, channel: Channel, who: str, payload: bytes, again_ns: int) -> None:
+        if identity in self.answers or identity not in self.verbs:
             return
         self._bus.put(who, channel, who, payload, self._bus.now_ns)
         if again_ns:
-            self._later(again_ns, lambda: self._ask(identity, channel, who, payload, again_ns))
+            self._later(again_ns, lambda: self._send(identity, channel, who, payload, again_ns))

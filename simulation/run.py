@@ -63,7 +63,7 @@ def rehearse(  # noqa: PLR0913  # options of a rehearsal, by keyword
     progress: Callable[[str], None] | None = None,
     on_stuck: Callable[[dict[str, Any]], None] | None = None,
 ) -> Rehearsed:
-    """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on those that it declares).
+    """Rehearse `ticks` ticks of a deployment text on `nodes` nodes (None: on the declared ones).
 
     `start` is a frame of another run to begin with (`capture.start_frame.read_branch`). `prepare` is called with the
     built system before it runs, so that a test or notebook can schedule requests.
@@ -109,7 +109,7 @@ def _run(
     """Run a system to its end and finish its capture, whatever ends it; return the result."""
     begun_ns = time.perf_counter_ns()
 
-    def told() -> dict[str, Any]:
+    def result() -> dict[str, Any]:
         wall_ns, found = time.perf_counter_ns() - begun_ns, system.supervisor.result()
         rtf = round((found["ticks"] - found["first_tick"]) * found["tick_ns"] / wall_ns, 3)
         return {**found, "rtf": rtf, "capture": None if capture is None else str(first_there(capture))}
@@ -118,7 +118,7 @@ def _run(
         if writer is not None:
             writer.leave()
         if on_stuck is not None:
-            on_stuck({**told(), "reason": reason, "failed": True})
+            on_stuck({**result(), "reason": reason, "failed": True})
 
     try:
         with Attendant(system, progress, stuck):
@@ -132,7 +132,7 @@ def _run(
             writer.leave()  # an interrupted rehearsal leaves it unfinished
     if writer is not None:
         _check_room(writer, Level.OUT)
-    return told()
+    return result()
 
 
 def _check_room(writer: Recorder, worst: Level) -> None:

@@ -1,6 +1,6 @@
 """A deployment stepped from Python: `with Simulation("deploy/table.yaml") as s: s.step({...})`.
 
-One process computes the world and the network. Agents are those whom the caller speaks for: by default all players of
+One process computes the world and the network. Agents are players that the caller controls: by default all players of
 the deployment, or one called `learner` where it has none. Its other players act by themselves, as declared.
 """
 
@@ -58,7 +58,7 @@ def _frame(deployment: Deployment, start: Start | Frame | str | None) -> Frame:
 class Simulation:
     """A world and its network, stepped by the caller. Use it as a context, or `close` it.
 
-    `tick`, `frame`, `status` and `readings` are those of the present frame.
+    `tick`, `frame`, `status` and `readings` are the present frame's.
     """
 
     def __init__(
@@ -74,12 +74,12 @@ class Simulation:
     ) -> None:
         """`deployment` is one that was loaded, or a file, of which `sets` change values as `--set` does.
 
-        `agents` are players that the caller speaks for. With `network`, packets go through the network that the
+        `agents` are players that the caller controls. With `network`, packets go through the network that the
         deployment declares; without, readings arrive at once and commands, too. The network hands readings to agents
         every `period` ticks. `start` is the frame to begin with: a `Frame`, a `Start`, or `CAPTURE@12.5s`. `seed` is
         another one than the deployment's.
 
-        Raises DeploymentError, AssetError, UnknownName for an agent that is none, BadValue for a start that does not
+        Raises DeploymentError, AssetError, UnknownName for an unknown agent, BadValue for a start that does not
         fit, PlayerError for a player that cannot be made.
         """
         loaded: Deployment
@@ -190,7 +190,7 @@ class Simulation:
 
     @property
     def scene(self) -> Scene:
-        """The bodies, also those that are absent, and the scenery."""
+        """The bodies, also absent ones, and the scenery."""
         if self._scene is None:
             self._scene = build_scene(self.deployment, self.frame.layout)
         return self._scene
@@ -206,7 +206,7 @@ class Simulation:
         """Send commands, by robot, at the present frame, and compute some ticks; return the readings then.
 
         A robot without a command keeps its last one. Raises UnknownName for a robot that no agent commands or that
-        takes no such command, BadValue for a robot that is absent and for names and numbers that are none of a command,
+        takes no such command, BadValue for an absent robot and for invalid names and numbers of a command,
         ComponentError and PlayerError for a form and a player that fail.
         """
         by_agent: dict[str, list[Packet]] = {name: [] for name in self.agents}
@@ -226,8 +226,7 @@ class Simulation:
     def set(self, name: str, field: str, value: object) -> None:
         """Set a field of an entity at the next step, as `foosim set` does: `set("crate-1", "at", "3,1")`.
 
-        Raises UnknownName, and BadValue for a field that is not settable, a value beyond its limits, and a place where
-        something is.
+        Raises UnknownName, and BadValue for a fixed field, a value beyond its limits, and an occupied place.
         """
         layout, numbers = self.frame.layout, self._coming()
         if name not in layout:
@@ -239,7 +238,7 @@ class Simulation:
     def add(self, name: str, at: object = None) -> str:
         """Add a spare at the next step, as `foosim add` does: `add("crate", "1,0")`; return its name.
 
-        Raises Refused for what is not absent, and BadValue for a place that is none, or where something is.
+        Raises Refused for a present or unknown one, and BadValue for an invalid or occupied place.
         """
         layout, numbers = self.frame.layout, self._coming()
         entity = absent_named(layout, numbers, name)
@@ -247,19 +246,19 @@ class Simulation:
         return entity.name
 
     def remove(self, name: str) -> None:
-        """Remove an entity at the next step, as `foosim remove` does. Raises Refused for what is not there."""
+        """Remove an entity at the next step, as `foosim remove` does. Raises Refused for an absent one."""
         check_present(self.frame.layout, self._coming(), name)
         self._edits.append(Remove(name))
 
     def _coming(self) -> list[float]:
-        """Return the numbers of the present frame after what is edited at the next step."""
+        """Return the numbers of the present frame after the edits of the next step."""
         return written(self.frame.layout, self.frame.numbers, self._edits)
 
     def partition(self, *groups: str | Sequence[str]) -> None:
         """Cut the network between groups of endpoints, names or selectors, from the next frame on until `heal`:
         `partition("red.*", ["camera", "player-blue"])`.
 
-        Raises BadEvent for groups that are none, BadValue without a network.
+        Raises BadEvent for invalid groups, BadValue without a network.
         """
         self._disrupt({"partition": [[group] if isinstance(group, str) else [*group] for group in groups]})
 
@@ -278,7 +277,7 @@ class Simulation:
         if ticks < 1:
             raise BadValue("ticks of a step are 1 or more", ticks)
         now_ns = self.tick * self.deployment.tick_ns
-        sent = {name: self.agents[name].numbered(those, now_ns) for name, those in packets.items() if those}
+        sent = {name: self.agents[name].numbered(new, now_ns) for name, new in packets.items() if new}
         for _ in range(ticks):
             self._close(sent)
             self._open()

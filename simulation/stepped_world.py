@@ -26,7 +26,7 @@ ONE_NODE: Final = "n1"
 
 
 def deal_robots(deployment: Deployment, nodes: int) -> dict[str, list[str]]:
-    """Return the robots of n1 to nN, dealt in turn: first those that engines solve, then others, each in name order."""
+    """Return the robots of n1 to nN, dealt in turn: first rigid ones, then others, each in name order."""
     rigid = sorted(name for name, robot in deployment.robots.items() if robot.component_type.is_rigid)
     others = sorted(set(deployment.robots) - set(rigid))
     dealt: dict[str, list[str]] = {f"n{number + 1}": [] for number in range(nodes)}
@@ -45,7 +45,7 @@ class SteppedWorld:
         robots: Mapping[str, Sequence[str]] | None = None,
         make: MakeEngine = make_engine,
     ) -> None:
-        """`robots` are those of each node, by default all of one; `make` makes the engine of each node."""
+        """`robots` are each node's, by default all of one; `make` makes the engine of each node."""
         nodes = robots or {ONE_NODE: list(deployment.robots)}
         self._roster = sorted(nodes)
         self._owners = {robot: node for node, its in nodes.items() for robot in its}
@@ -82,7 +82,7 @@ class SteppedWorld:
         return packets
 
     def step(self, delivered: Sequence[Delivered], edits: Sequence[Edit] = ()) -> Frame:
-        """Compute the next frame from what reaches the robots at this one, in order, and what is edited before.
+        """Compute the next frame from the robots' packets and the edits at this one, in order.
 
         Raises ComponentError.
         """

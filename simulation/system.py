@@ -290,7 +290,7 @@ class System:
             process.took(process.clock.at(self.bus.now_ns), process.clock.at(leaves_ns))
         for action in actions:
             if self.hub_journal.ending and type(action) is Journal and process.core is self.hub:
-                if self.hub_journal.ending == "unsaid":
+                if self.hub_journal.ending == "unpublished":
                     self._keep(leaves_ns, process, action)
                 self._end_hub()
                 return
@@ -301,7 +301,7 @@ class System:
                 self._keep(leaves_ns, process, action)
         actions.clear()
         if process.core is self.supervisor and self._frames:
-            self._tell_commits(was_cut=left is not None)
+            self._report_commits(was_cut=left is not None)
         if process.core is self.hub and self.hub.finished and process.name in self.processes:
             self._close(process, leaves_ns)
 
@@ -311,8 +311,8 @@ class System:
 
         def turn(now_ns: int) -> None:
             if self.settings.closing(hub, self.bus.now_ns - begun_ns) and channels.VHUB in self.processes:
-                said, at_ns = hub.farewell(), max(begun_ns, self.bus.now_ns)
-                self.bus.put(process.name, said.channel, said.name, said.payload, at_ns)
+                farewell, at_ns = hub.farewell(), max(begun_ns, self.bus.now_ns)
+                self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, at_ns)
                 self.leave(process.name)
 
         process.core, process.turn = ClosingCore(hub), turn
@@ -358,7 +358,7 @@ class System:
         if self.settings.observer is not None and what in self.settings.observes:
             self.settings.observer(Traced(now_ns, process.name, what, channel, payload, name))
 
-    def _tell_commits(self, was_cut: bool) -> None:
+    def _report_commits(self, was_cut: bool) -> None:
         """Report the committed frames; a commit that a crashed supervisor had not journalled does not count."""
         frames = self._frames.copy()
         self._frames.clear()
@@ -440,7 +440,7 @@ class System:
             self._supervisor_sees_gone(name)
 
     def end_amid(self, name: str, actions: int) -> None:
-        """End the supervisor amid its next turn, after it has performed so many of its actions."""
+        """End the supervisor amid its next turn, after the first `actions` of its actions."""
         self._dying[name] = actions
 
     def is_dying(self, name: str) -> bool:

@@ -1,8 +1,8 @@
 """Verify a capture: simulate it again from orders and deliveries, compare the digest of every tick.
 
 The function behind `foosim capture verify`. It starts with the frame that the run began with, which is frame 0 but
-for a branch, on any number of nodes, and names the first tick and the entities that differ. With a later one it starts
-only where that is asked for, of a cut. Frames between the captured ones are computed in the same way.
+for a branch, on any number of nodes, and names the first tick and the entities that differ. It starts with a later one
+only on request, of a cut. Frames between the captured ones are computed in the same way.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ COMPUTING: Final = ("mujoco-core", "numpy", "pybullet")
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """What a verification found. `tick` is the first that differs, -1 if none does; `entities` are those that do.
+    """What a verification found. `tick` is the first that differs, -1 if none does; `entities` are the differing ones.
 
     `first_tick` is that of the frame that the run began with, `ticks` that of the last one that was compared.
     """
@@ -59,7 +59,7 @@ class Verified:
     """Libraries that compute worlds and have another version here: `LIBRARY VERSION, here VERSION`."""
     first_tick: int = 0
     finished: bool = True
-    """Whether the capture has its end: ticks of the run may follow one that has none."""
+    """Whether the capture has its end: ticks of the run may follow an unfinished one."""
 
     @property
     def equal(self) -> bool:
@@ -104,9 +104,9 @@ def start_of(capture: CaptureData) -> Start | None:
 
 
 def verify(about: About, ticks: Iterable[CapturedTick], nodes: int = 1, start: Start | None = None) -> Verified:
-    """Simulate again the run of `ticks` (from 0, or from that of `start` on, in order) on `nodes` nodes, and compare.
+    """Simulate again the run of `ticks` (from 0, or from the tick of `start`, in order) on `nodes` nodes, and compare.
 
-    Raises CaptureError for a deployment that is not valid here, AssetError for a mesh that an engine refuses, BadValue
+    Raises CaptureError for a deployment that is invalid here, AssetError for a mesh that an engine refuses, BadValue
     for another number of nodes.
     """
     if not 1 <= nodes <= NODES_MAX:
@@ -123,7 +123,7 @@ def verify(about: About, ticks: Iterable[CapturedTick], nodes: int = 1, start: S
 
 
 def captured_world(about: About, deployment: Deployment, frame: Frame, nodes: int = 1) -> SteppedWorld:
-    """Return a capture's world at a frame, on so many nodes. Raises AssetError for a file of an unfit model."""
+    """Return a capture's world at a frame, on `nodes` nodes. Raises AssetError for a file of an unfit model."""
     check_shapes(deployment, about.deployment_name, about.deployment_text)
     return SteppedWorld(deployment, frame, deal_robots(deployment, nodes))
 

@@ -1,7 +1,7 @@
 """What-if: the packets of a capture, judged again by another network.
 
 The ticks of the capture are closed again by the vHub's own state, with the frames, clients and orders that the capture
-has, and with the network that is asked about. It is an open loop: robots and clients send what they sent, whatever
+has, and with the other network. It is an open loop: robots and clients send what they sent, whatever
 reaches them. Without another network every fate is the captured one. Where fates depend on places and the capture does
 not have the frame of every tick, the world is simulated again from its orders and deliveries. What is held of a packet
 beyond its fates are two times on its link.
@@ -89,7 +89,7 @@ class PacketChange:
 
 @dataclass(frozen=True, slots=True)
 class WhatIf:
-    """What another network would have made of a capture's packets."""
+    """The fates of a capture's packets under another network."""
 
     packets: int
     changed: int
@@ -107,7 +107,7 @@ class WhatIf:
     caveats: tuple[str, ...] = ()
     """Why fates may not be the captured ones even without another network."""
     ages: tuple[AgeChange, ...] = ()
-    """Ages at use by channel. Who acts at arrival is asked when packets arrive then, and sends what it sent."""
+    """Ages at use by channel. A client that acts at arrival acts at other times then, and sends what it sent."""
 
 
 @dataclass(slots=True)
@@ -156,7 +156,7 @@ def _age_ms(sent: np.ndarray, due: np.ndarray) -> float:
 def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatIf:
     """Judge a capture's packets again, by its own network or that of another deployment of the same world.
 
-    Raises CaptureError for what the capture lacks.
+    Raises CaptureError for a lack in the capture.
     """
     compared = _Compared(capture)
     deployment = deployment or capture.deployment
@@ -165,8 +165,8 @@ def what_if(capture: CaptureData, deployment: Deployment | None = None) -> WhatI
     offers = Offers(capture, frames, compared.keep, before.take_row)
     for flight in _judged(capture, deployment, offers, frames, after):
         compared.take(flight)
-    told = offers.earlier, parts_lacking(capture), _age_changes(before, after)
-    return replace(compared.result(), earlier=told[0], caveats=told[1], ages=told[2])
+    caveats = parts_lacking(capture)
+    return replace(compared.result(), earlier=offers.earlier, caveats=caveats, ages=_age_changes(before, after))
 
 
 def _age_changes(before: AgeTallies, after: AgeTallies) -> tuple[AgeChange, ...]:
@@ -258,7 +258,7 @@ def _judged(
     capture: CaptureData, deployment: Deployment, offers: Offers, frames: Frames, ages: AgeTallies
 ) -> Iterator[Flight]:
     """Close the ticks of a capture again; yield the packets as their fates become final, the rest at the end. `ages`
-    are told the ages at use."""
+    takes the ages at use."""
     state = HubState(deployment, offers.first)
     with world_of(capture, frames) as frame_of:
         for offered in offers.ticks():
@@ -277,7 +277,7 @@ def _judged(
             for (source, _), sent in sorted(offered.clients.items()):
                 admitted.setdefault(source, []).append(sent)
             state.close_clients(frame, admitted, fates)
-            state.final = state.closed + 1  # none ahead: who acts at arrival spoke when the captured network let it
+            state.final = state.closed + 1  # none ahead: clients at arrival acted by the captured network
             ages.take(state.aged)
             yield from fates
     ages.take(state.ages.unreported(state.closed))

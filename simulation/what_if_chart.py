@@ -1,4 +1,4 @@
-"""What another network changes, drawn per link: what is delivered, how late, and how old the newest is.
+"""The changes by another network, drawn per link: delivered packets, delays, and the age of the newest packet.
 
 Two bars for each link and figure, captured above, judged again below.
 """

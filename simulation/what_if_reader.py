@@ -1,8 +1,8 @@
-"""What a capture has of each tick that is judged again: who came and went, what was offered, which frame there was.
+"""The inputs of each tick that is judged again, from a capture: clients, packets, edits, and the frame.
 
-The row of a packet stands in the file where its fate became final, which may be long after the tick at which it was
-sent. How far back rows reach is told by the heads of the chunks to come: a tick is given out as soon as they can have
-nothing of it any more. So what is held of a capture is what was in flight, and a chunk.
+The row of a packet is in the file where its fate became final, which may be long after the tick at which it was
+sent. The heads of the chunks to come limit how far back rows reach: a tick is yielded as soon as none of them can
+have a row of it. So the memory holds the packets in flight, and a chunk.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ Frames = Literal["first", "captured", "computed"]
 """Source of frames: the first one is used for all, each is in the capture, or they are simulated again."""
 _INDEX: Final = (1 << OUTBOX_SHIFT) - 1
 _WHO_HEARS: Final = frozenset({"add", "remove", "set"})
-"""Edits that may change which robots and players hear and speak."""
+"""Edits that may change which robots and players hear and send."""
 
 
 @dataclass(slots=True)
 class Offered:
-    """One tick: what led to its frame, the frame if it is read, who came and went, what was offered.
+    """One tick: what led to its frame, the frame if it is read, joins and leaves, the offered packets.
 
     A published packet is there once, whatever number of receivers it had; packets go by (source, sequence number).
     """
@@ -45,7 +45,7 @@ class Offered:
     came: list[ClientRow] = field(default_factory=list)
     robots: dict[tuple[str, int], RobotPacket] = field(default_factory=dict)
     counts: dict[tuple[str, int], int] = field(default_factory=dict)
-    """Of these, the counts within their channels: packets that nobody heard are not in a capture, and are counted."""
+    """Of these, the counts within their channels: packets without a receiver are counted, but missing in a capture."""
     clients: dict[tuple[str, int], Sent] = field(default_factory=dict)
 
     @property
@@ -54,7 +54,7 @@ class Offered:
 
 
 def frames_for(capture: CaptureData, *, on_radio: bool) -> Frames:
-    """Return which frames are needed: only one where no fate depends on places and nobody comes, goes or goes out of
+    """Return which frames are needed: only one if no fate depends on places and no entity comes, leaves or changes
     service."""
     if not on_radio and capture.edit_kinds.isdisjoint(_WHO_HEARS) and not capture.deployment.events:
         return "first"
@@ -66,7 +66,7 @@ def parts_lacking(capture: CaptureData) -> tuple[str, ...]:
     ones without another network."""
     found = []
     if CUT_TICK in capture.about.metadata:
-        found.append("it begins within its run: what links remembered, and events asked for before, are not known")
+        found.append("it begins within its run: earlier states of links and requested events are unknown")
     end = capture.about.end
     if not capture.finished or "problem" in end or end.get("reason") == CUT_REASON:
         found.append("it does not have the end of its run: packets in flight there may lack, and take no part")
@@ -74,7 +74,7 @@ def parts_lacking(capture: CaptureData) -> tuple[str, ...]:
 
 
 def judged_ticks(capture: CaptureData) -> list[int]:
-    """Return the ticks that are closed again: behind the last frame of a run that has its end nothing was sent."""
+    """Return the ticks that are closed again: after the last frame of a run with its end nothing was sent."""
     ticks: list[int] = capture.ticks.tolist()
     return ticks[:-1] if capture.finished and capture.about.end.get("reason") != CUT_REASON else ticks
 
@@ -97,7 +97,7 @@ class Offers:
         ticks = judged_ticks(capture)
         self.first, self._stop = (ticks[0], ticks[-1] + 1) if ticks else (0, 0)
         self._next = self.first
-        """The first tick that is not yielded yet."""
+        """The first tick that is still to be yielded."""
         self.earlier = 0
         """How many rows are of packets that were sent before the capture begins, and are not judged again."""
         self._offered: dict[int, Offered] = {}
@@ -157,7 +157,7 @@ class Offers:
         if row.copy:
             return
         if tick < self._next:
-            what = f"a packet of {source} that was sent at tick {tick} stands behind what was sent later"
+            what = f"a packet of {source} that was sent at tick {tick} follows later ones"
             raise CaptureError(f"{self._capture.path}: {what}")
         to = "" if row.published else row.destination
         payload = row.payload
@@ -177,7 +177,7 @@ class Offers:
 
 @contextmanager
 def world_of(capture: CaptureData, frames: Frames) -> Iterator[Callable[[Offered], Frame]]:
-    """Give what returns the frame of each tick, asked for in order. Raises CaptureError for one that is not there."""
+    """Yield a function from tick to frame, to be called in order. Raises CaptureError for a missing frame."""
     if frames == "captured":
         yield lambda offered: _captured(capture, offered)
     elif frames == "first":
@@ -199,14 +199,14 @@ def _tick_of(offered: Offered) -> int:
 
 
 def _later(first: Frame, offered: Offered) -> Frame:
-    """Let time go on in a frame in which nothing else does: what is known of it stays known."""
+    """Set a frame's tick without any other change: what is known of it stays known."""
     first.tick = _tick_of(offered)
     return first
 
 
 def _captured(capture: CaptureData, offered: Offered) -> Frame:
     if offered.frame is None:
-        raise CaptureError(f"{capture.path}: frame {_tick_of(offered)} stands behind what was sent later")
+        raise CaptureError(f"{capture.path}: frame {_tick_of(offered)} follows later rows")
     return offered.frame
 
 

@@ -42,7 +42,7 @@ def in_processes(
         except BrokenProcessPool:
             few = f"fewer than --jobs {jobs} need less memory"
             raise Failed(f"a process of {what} was killed; {few}") from None
-        finally:  # Ctrl-C and a closed iterator, too: nobody waits for the rest any more
+        finally:  # Ctrl-C and a closed iterator, too: nothing waits for the rest any more
             for process in active_children():
                 if process not in others:
                     process.kill()

@@ -1,4 +1,4 @@
-"""Absences of players: who is away, who returned, who left the run. The vHub's part of the run's recoveries.
+"""Absences of players: away, returned, or out of the run. The vHub's part of the run's recoveries.
 
 Entries are numbered and repeated in every heartbeat, since heartbeats may be lost. They are journalled first, so that
 a restarted vHub reports them again.
@@ -20,8 +20,8 @@ class Absences:
 
     def __init__(self) -> None:
         self._away: dict[str, tuple[str, str, int]] = {}
-        """By player: the boot of its process, empty where that is not known, reason, and the tick that was closed next
-        at its disconnect."""
+        """By player: the boot of its process (empty if unknown), the reason, and the tick that was closed next at its
+        disconnect."""
         self._over: list[tuple[int, str, str, str, int]] = []
         self._count = 0
         self.is_new = False

@@ -32,7 +32,7 @@ LOST_MEANWHILE: Final = "its process was lost while the vHub was away"
 
 
 class Clients:
-    """The clients of one run: who takes part, who is away, whose Done a tick waits for."""
+    """The clients of one run: members, absent ones, and whose Done a tick waits for."""
 
     def __init__(
         self,
@@ -91,7 +91,7 @@ class Clients:
         return None if self._state is None else self._state.members.get(name)
 
     def come_and_go(self, tick: int) -> tuple[list[Joining], list[str]]:
-        """Return who joins and leaves at a tick. The tick's Go depends on it and leaves before the tick's record is
+        """Return joining and leaving clients of a tick. Its Go depends on them and leaves before the tick's record is
         written, so it has a record of its own."""
         assert self._state is not None
         written, self.written = self.written, None
@@ -110,7 +110,7 @@ class Clients:
             for joining in joins:
                 if _is_return(joining, members):
                     self.absences.come_back(joining.name, tick)
-            self.tell()
+            self.report()
         return joins, leaves
 
     def go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
@@ -160,7 +160,7 @@ class Clients:
         is_another = not (session.is_present or session.returns or join.period)
         self._sessions.catch_up(session, self.waits_for(join.name), now_ns)
         self.absences.end(join.name, join.boot, session.returns)
-        self.tell()
+        self.report()
         known = self._known(join.name)
         if known is not None and join.name not in self._leaves and _is_member(known, join) and not is_another:
             self.repeated += 1
@@ -182,15 +182,15 @@ class Clients:
         repeated = session.take(up.packets)
         if repeated:
             self._state.reject_on_receipt("duplicate", repeated)
-            session.heard = 0  # acknowledge again: it does not know what is recorded
+            session.heard = 0  # acknowledge again: it lacks the acknowledgement
 
     def on_done(self, done: Done, payload: bytes, now_ns: int) -> None:
         """Take a lockstep client's answer to a Go."""
         session = self._session(done)
         if session is None:
             return
-        is_asked = self.waits_for(done.name) and done.tick == session.go_tick
-        if not is_asked or not session.is_present:
+        is_current = self.waits_for(done.name) and done.tick == session.go_tick
+        if not is_current or not session.is_present:
             self.repeated += 1
             return
         self.take_done(done.name)
@@ -219,8 +219,8 @@ class Clients:
         self._give_up(failure.reason)
 
     def _joining(self, join: Join) -> Session | None:
-        """Return the session of a process that joins. One that was welcomed while another one had its name gets it
-        if that has not joined, and is refused otherwise."""
+        """Return the session of a process that joins. A process that was welcomed while another one had its name gets
+        it unless that one has joined, and is refused otherwise."""
         session = self._sessions.by_name.get(join.name)
         if self._sessions.is_for_another(join):
             self.repeated += 1
@@ -243,7 +243,7 @@ class Clients:
         return session
 
     def _last_sent(self, name: str) -> int | None:
-        """Return the last downlink sent to a client: neither a Go without a Done nor one that is yet to be released."""
+        """Return the last downlink sent to a client: neither a Go without a Done nor an unreleased one."""
         member = None if self._state is None else self._state.members.get(name)
         if member is None or self._releases is None:
             return None
@@ -260,7 +260,7 @@ class Clients:
         if was_fast != (not releases.factor):
             self._turn_to_pace(now_ns)
 
-    # --- who is away -------------------------------------------------------------------------------------------------
+    # --- absences ----------------------------------------------------------------------------------------------------
 
     def on_gone(self, name: str, now_ns: int) -> None:
         """A client has disconnected: a free-running one leaves the run, for a lockstep one the run waits."""
@@ -279,9 +279,9 @@ class Clients:
         """Record that a player's process is away from a run that has begun."""
         if self._deployment is not None and may_restart(self._deployment, name) and self.has_begun:
             self.absences.begin(name, boot, reason, self._tick)
-            self.tell()
+            self.report()
 
-    def tell(self) -> None:
+    def report(self) -> None:
         """Report new absences and returns at once, after their record: a run may end soon."""
         if self.absences.is_new:
             self.absences.is_new = False
@@ -313,7 +313,7 @@ class Clients:
         return 0 if self._state is None else self._state.closed + 1
 
     def rest(self, stood_ns: int, now_ns: int) -> None:
-        """The vHub's own loop stood still for so long: that counts against no client.
+        """The vHub's own loop was blocked for `stood_ns`: that counts against no client.
 
         Where connections may have closed by it, clients have their whole time from now on (`standstill`).
         """
@@ -323,8 +323,8 @@ class Clients:
     def wake(self, now_ns: int, *, holds: bool) -> None:
         """Repeat Go, and end the run or continue without clients whose answer or return is overdue.
 
-        Both deadlines are suspended while the run is paused. They begin anew while the vHub `holds`, which is when it
-        waits for its supervisor: what closed that connection may have closed those of clients as well.
+        Both deadlines are suspended while the run is paused. They begin anew while the vHub `holds`, waiting for its
+        supervisor: the cause that closed that connection may have closed connections of clients as well.
         """
         if self._state is None:
             return
@@ -379,7 +379,7 @@ class Clients:
             self._sessions.send_owed(name, now_ns)
 
     def _is_waited_for(self, name: str) -> bool:
-        """Whether the run waits for a client: it is in lockstep, or the tick that is being closed goes by its Done."""
+        """Whether the run waits for a client: it is in lockstep, or the present tick closes by its Done."""
         known = self._known(name)
         is_here = isinstance(known, Joining) or (known is not None and known.active and name not in self._leaves)
         is_in_lockstep = known is not None and is_here and known.period > 0
@@ -409,7 +409,7 @@ def _is_return(joining: Joining, members: Mapping[str, Member]) -> bool:
 
 
 def _is_member(known: Member | Joining, join: Join) -> bool:
-    """Whether a client takes part as it asks to."""
+    """Whether a client is a member as its Join requests."""
     wanted = [{(item.source, item.channel) for item in items} for items in (join.subscriptions, join.arrivals)]
     active = isinstance(known, Joining) or known.active
     is_timed_so = (known.period, known.offset) == (join.period, join.offset)

@@ -85,7 +85,7 @@ class _Step(Enum):
     WRITTEN = 1
     """The tick's record and its deliveries are among the actions."""
     RELEASED = 2
-    """So is what is released to free-running clients."""
+    """Also what is released to free-running clients."""
 
 
 @dataclass(slots=True)
@@ -106,8 +106,8 @@ class ResumeHandshake:
     """Whether a vHub that resumes from a journal has the supervisor's grant, and what it sends once it has.
 
     The journal's end may be lost with the machine. So the vHub reports its resume position; until the grant it closes
-    no tick, takes no commit and admits no client. `machine` is the present boot of its machine, empty where that has no
-    name.
+    no tick, takes no commit and admits no client. `machine` is the present boot of its machine, empty for an unnamed
+    one.
     """
 
     def __init__(self, machine: str) -> None:
@@ -252,7 +252,7 @@ class HubCore:
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
         if self._retry.is_over(now_ns) and self.epoch > 0 and not self.finished:
-            self._ask_again(now_ns)
+            self._request_again(now_ns)
         self._release(now_ns)
         if self.ended is not None and not self.finished and now_ns >= self._end_ns:
             self._finish(now_ns)
@@ -270,7 +270,7 @@ class HubCore:
         return deadline if late_ns is None else min(deadline, late_ns)
 
     def rest(self, stood_ns: int, now_ns: int) -> None:
-        """The vHub's own loop stood still for so long: that counts neither against clients nor the supervisor."""
+        """The vHub's own loop was blocked for `stood_ns`: that counts neither against clients nor the supervisor."""
         self.orphan.rest(stood_ns, now_ns)
         if stood_ns >= REPORTED_NS:
             self.actions.append(Log("warning", standstill_text(stood_ns)))
@@ -364,7 +364,7 @@ class HubCore:
         world, state = self._world, self.state
         assert world is not None and state is not None
         tick = world.frame.tick
-        self._tell_of_waits(now_ns)
+        self._report_waits(now_ns)
         self.clients.leave_owing(state, world.closing)
         admitted = self.sessions.take_sent() if state.hears_clients else {}
         samples = self._samples.pop(tick, [])
@@ -375,7 +375,7 @@ class HubCore:
         record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
         self.actions.append(Journal(record))
         self.clients.send_owed(world.closing, now_ns)
-        self.clients.tell()
+        self.clients.report()
         self._sent.pop(tick + 1 - limits.KEPT_TICKS, None)
         if not state.was_final:
             self._sent[tick + 1] = payload
@@ -386,7 +386,7 @@ class HubCore:
         return True
 
     def _release_closed(self, world: _World, sent_ns: int) -> None:
-        """After the deliveries, release to free-running clients what is due by now."""
+        """After the deliveries, release to free-running clients the packets due by now."""
         state, releases = self.state, self.releases
         assert state is not None and releases is not None
         for name, flights in world.free.items():
@@ -417,7 +417,7 @@ class HubCore:
         self.commits.forget(tick - limits.KEPT_TICKS)
         self._retry.progress(state.tick_ns, world.sent_ns)
 
-    def _tell_of_waits(self, now_ns: int) -> None:
+    def _report_waits(self, now_ns: int) -> None:
         """Before late deliveries, report to the supervisor what they waited for."""
         assert self.releases is not None and self.state is not None
         factor = self.releases.factor
@@ -445,7 +445,7 @@ class HubCore:
         )
 
     def _release(self, now_ns: int) -> None:
-        """Send what is released to free-running clients by now; closings of which nothing waits go to the capture."""
+        """Send packets to free-running clients that are due by now; closings without dependants go to the capture."""
         if self.releases is None or self.state is None:
             return
         for release in self.releases.take(now_ns, everything=self.finished):
@@ -573,7 +573,7 @@ class HubCore:
     # --- resuming ----------------------------------------------------------------------------------------------------
 
     def _resume_state(self) -> Publish:
-        """Return the report of how far the world has come here, which goes before each ready."""
+        """Return the report of the resume position, which is sent before each ready."""
         state, build = self.state, self.member.build
         assert state is not None and build is not None
         standing = ResumeState(
@@ -598,7 +598,7 @@ class HubCore:
         self._enter()
 
     def _enter(self) -> None:
-        """An epoch has begun, or a grant has come: once both are there, send the last deliveries and ask for the next
+        """An epoch has begun, or a grant has come: once both are there, send the last deliveries and request the next
         commits and samples."""
         handshake, state = self.handshake, self.state
         if handshake.waits and self.epoch < handshake.granted_from:
@@ -621,14 +621,14 @@ class HubCore:
     def _fences(self, commit: Commit) -> bool:
         """Whether a commit does not count: it is of an epoch before the present one.
 
-        Up to the epoch's first tick it counts under its old epoch: what is committed never changes.
+        Up to the epoch's first tick it counts under its old epoch: committed frames never change.
         """
         is_old = commit.epoch < self.epoch and commit.tick > self._epoch_tick
         return is_old or self.handshake.waits
 
     # --- time --------------------------------------------------------------------------------------------------------
 
-    def _ask_again(self, now_ns: int) -> None:
+    def _request_again(self, now_ns: int) -> None:
         assert self.state is not None
         tick, kind = self.state.closed + 1, channels.SAMPLES.name
         if self.commits.next_tick <= (tick if self.ended is None else self.ended.tick):

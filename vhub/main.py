@@ -265,8 +265,8 @@ class HubShell:
             if self._capture is not None:  # left unchanged: no log row about this
                 self._capture.leave()
                 self._capture = None
-            core.failure = f"cannot go on: {error}"
-            core.lose(VHUB, f"it cannot go on: {error}")
+            core.failure = f"cannot continue: {error}"
+            core.lose(VHUB, f"it cannot continue: {error}")
             return
         self._listen(deployment)
 

@@ -20,8 +20,8 @@ ANCHOR_WINDOW_NS: Final = 1_000_000_000
 class Release:
     """Flights that leave together for one client, as its downlink `number`, at wall time `at_ns`.
 
-    Their latest was due at wall time `due_ns`; None where nothing is due by the clock. `since` and `absent` are those
-    of the client at the tick.
+    Their latest was due at wall time `due_ns`; None where nothing is due by the clock. `since` and `absent` are the
+    client's at the tick.
     """
 
     at_ns: int
@@ -41,7 +41,7 @@ class Releases:
         self.factor = 0.0
         self.paused = False
         self.lateness = Lags()
-        """Lateness of packets, due to sent; of this process, without those of the run's end."""
+        """Lateness of packets, due to sent, of this process, without packets of the run's end."""
         self._tick_ns = tick_ns
         self._anchors: deque[tuple[int, int]] = deque()
         self._waiting: list[Release] = []
@@ -72,7 +72,7 @@ class Releases:
         since: int = 0,
         absent: tuple[str, ...] = (),
     ) -> None:
-        """Queue the packets of a closed tick, and who exists, for a client, never before earlier ones."""
+        """Queue the packets of a closed tick, `since` and `absent` for a client, never before earlier ones."""
         at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
         due_ns = None
         if self.factor and self._anchors and flights:
@@ -83,7 +83,7 @@ class Releases:
         self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
 
     def take(self, now_ns: int, everything: bool = False) -> list[Release]:
-        """Remove and return what is due by now, in order; at the end of the run `everything`."""
+        """Remove and return packets due by now, in order; at the end of the run `everything`."""
         due = [release for release in self._waiting if everything or release.at_ns <= now_ns]
         self._waiting = self._waiting[len(due) :]
         for release in due:

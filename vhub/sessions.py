@@ -103,8 +103,8 @@ class Session:
     claims: dict[str, Claim] = field(default_factory=dict)
     """The last processes that were welcomed to the name and may still run, by boot."""
     away_ns: int = -1
-    """The earliest time at which an absent client is given up, or a restarted one that has not joined; -1 while it is
-    present."""
+    """The earliest time at which an absent client is given up, or a restarted one that is still to join; -1 while it
+    is present."""
     back_ns: int = 0
     """The time that it is given for that."""
     next_sequence: int = 1
@@ -167,7 +167,7 @@ class Session:
         self.back_ns, self.away_ns = back_ns, now_ns + back_ns
 
     def rest(self, for_ns: int, now_ns: int) -> None:
-        """Extend the deadlines by a standstill of `for_ns`, at most to those that would begin now."""
+        """Extend the deadlines by a standstill of `for_ns`, at most to new deadlines from now on."""
         if self.away_ns >= 0:
             self.away_ns = min(self.away_ns + for_ns, now_ns + self.back_ns)
         if self.deadline_ns:
@@ -316,7 +316,7 @@ class Sessions:
         return not session.is_present and (self._is_resumed or may_restart(deployment, session.name))
 
     def missing(self, deployment: Deployment, state: HubState) -> list[str]:
-        """Return the declared lockstep clients that have not joined yet, in name order."""
+        """Return the declared lockstep clients that are still to join, in name order."""
         declared = sorted([*deployment.players, *deployment.clients])
         here = {name for name, member in state.members.items() if member.active} | self.joins.keys()
         return [name for name in declared if may_lockstep(deployment, name) and name not in here]
@@ -396,7 +396,7 @@ class Sessions:
     def send_owed(self, name: str, now_ns: int) -> None:
         """Send the packets of an unanswered Go as a Down, and keep it: they count as delivered.
 
-        Neither the lost process nor the next one has necessarily received that Go.
+        The lost process and the next one may both lack that Go.
         """
         go = decode(Go, self.by_name[name].go)
         payload = encode(Down(go.number, go.tick, go.acknowledged, go.packets, False, go.since, go.absent))
@@ -404,7 +404,7 @@ class Sessions:
         self._actions.append(Publish(channels.DOWN, name, payload))
 
     def resend(self, name: str, number: int) -> None:
-        """Send a client's downlinks from a number on: those that are journalled and may not have been sent."""
+        """Send a client's downlinks from a number on, as far as they are journalled and may be unsent."""
         self._actions += [Publish(channels.DOWN, name, payload) for payload in self.downlinks.after(name, number - 1)]
 
     def send_down(self, name: str, down: Down, now_ns: int) -> None:
@@ -451,7 +451,7 @@ class Sessions:
         return min(self.by_name[name].again_ns for name in waited)
 
     def repeat(self, waited: Sequence[str], now_ns: int) -> None:
-        """Repeat a Go to clients that have not answered it, with exponential back-off."""
+        """Repeat a Go to clients that owe its answer, with exponential back-off."""
         for name in waited:
             session = self.by_name[name]
             if now_ns >= session.again_ns:

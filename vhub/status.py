@@ -60,7 +60,7 @@ class LinkLines:
 
     def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> msgspec.Raw:
         """Return the lines as JSON for one more heartbeat, renewed when they are due: the links with the most traffic
-        and those that are watched."""
+        and the watched ones."""
         if anew or self._heartbeats % LINKS_REPORTED_EVERY == 0:
             self._lines = msgspec.Raw(encode_json(_links(state, watched)))
         self._heartbeats += 1
@@ -78,7 +78,7 @@ def report(
 ) -> bytes:
     """Return the statistics, the addresses of the radio plane and the capture, and the state of the recording.
 
-    `links` are those with the most traffic, and those that are watched: [from, to, offered, delivered, dropped, mean
+    `links` are the links with the most traffic, and the watched ones: [from, to, offered, delivered, dropped, mean
     delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
     Ages at use are [channel, uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts
     messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,

@@ -1,4 +1,4 @@
-"""Accounts for the time that a closing waits for others, so that a late tick is attributed to who caused it.
+"""Accounts for the time that a closing waits for others, so that a late tick is attributed to the process at fault.
 
 A closing waits for the nodes' samples once its commit has come, and for the clients' Dones once their Go has been sent.
 Time in which the vHub itself was busy is attributed to no other process.
@@ -10,7 +10,7 @@ from foosim.protocol.messages import DONE_OF, SAMPLES_OF
 
 
 class WaitTimes:
-    """Wait times of the present closing. `node` and `client` are those whose samples and Done came last."""
+    """Wait times of the present closing. `node` and `client` are the last ones to send samples and Done."""
 
     def __init__(self) -> None:
         self.node = self.client = ""

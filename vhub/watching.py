@@ -66,19 +66,19 @@ class WatchList:
         """Return the report, empty while nothing is watched.
 
         `drops` has for each link, `FROM>TO`, its last packets that were dropped, as rows of a capture without their
-        payloads, oldest first; `readings` for each `ROBOT/CHANNEL` its last readings, [tick, [numbers]]; `asked` the
-        network events that were requested, [tick, event as JSON], and `here` the clients that take part, both for the
-        explanation of drops.
+        payloads, oldest first; `readings` for each `ROBOT/CHANNEL` its last readings, [tick, [numbers]]; `events` the
+        requested events of the network, [tick, event as JSON], and `here` the active clients, both for the explanation
+        of drops.
         """
         if not self.links and not self.readings:
             return {}
         rows = {f"{a}>{b}": [_row(flight) for flight in flights] for (a, b), flights in self.links.items()}
         readings = {f"{robot}/{channel}": list(kept) for (robot, channel), kept in self.readings.items()}
-        asked = [encode_json(event) for event in state.fabric.asked] if self.links else []
+        events = [encode_json(event) for event in state.fabric.requested] if self.links else []
         watched = {
             "drops": _newest(rows),
             "readings": _newest(readings),
-            "events": _newest({"": asked})[""],
+            "events": _newest({"": events})[""],
             "here": sorted(name for name, member in state.members.items() if member.active),
         }
         return {"watched": watched}

@@ -1,9 +1,9 @@
 """Checksums and digests in an MCAP file, by which a reader detects damage.
 
-A chunk and an attachment have a checksum of their own, metadata the entry `digest`. Behind the attachments stands the
+A chunk and an attachment have a checksum of their own, metadata the entry `digest`. After the attachments follows the
 metadata `foosim.digests`: a digest of each attachment, and the checksum of all bytes before. The end has the checksum
-of everything before it, and one of the summary. What a chunk's head says of times is compared with the chunk's indexes.
-So a file without an end is checked, too, and one of which only a part is read.
+of everything before it, and one of the summary. The times in a chunk's head are compared with the chunk's indexes.
+So a file without an end is checked, too, and a partly read one.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ def sealed(name: str, entries: Mapping[str, str]) -> dict[str, str]:
 
 
 def read_metadata(content: bytes) -> records.Metadata:
-    """Return a record of metadata without its digest. Raises ValueError when that is another one."""
+    """Return a record of metadata without its digest. Raises ValueError for a wrong digest."""
     found = records.Metadata.read(ReadDataStream(BytesIO(content)))
     entries = dict(found.metadata)
-    told = entries.pop(DIGEST, None)
-    if told is None and found.name.startswith(_SEALED):
+    written = entries.pop(DIGEST, None)
+    if written is None and found.name.startswith(_SEALED):
         raise ValueError(f"metadata {found.name!r} lacks its digest")
-    if told is not None and told != (computed := _digest(found.name, entries)):
-        raise ValueError(f"metadata {found.name!r} has digest {computed}, written was {told!r}")
+    if written is not None and written != (computed := _digest(found.name, entries)):
+        raise ValueError(f"metadata {found.name!r} has digest {computed}, written was {written!r}")
     return records.Metadata(name=found.name, metadata=entries)
 
 
@@ -70,56 +70,56 @@ def _digest(name: str, entries: Mapping[str, str]) -> str:
 def read_attachment(content: bytes) -> records.Attachment:
     """Return an attachment. Raises ValueError when its checksum is wrong."""
     found: records.Attachment = records.Attachment.read(ReadDataStream(BytesIO(content)))
-    (told,) = _CRC.unpack_from(content, len(content) - _CRC.size)
-    compare(f"attachment {found.name!r}", crc32(memoryview(content)[: -_CRC.size]), told)
+    (written,) = _CRC.unpack_from(content, len(content) - _CRC.size)
+    compare(f"attachment {found.name!r}", crc32(memoryview(content)[: -_CRC.size]), written)
     return found
 
 
-def compare(what: str, computed: int, told: int) -> None:
-    """Raise ValueError when a checksum is not the one that was written; 0 is none."""
-    if told not in (0, computed):
-        raise ValueError(f"{what}: checksum {computed:08x}, written was {told:08x}")
+def compare(what: str, computed: int, written: int) -> None:
+    """Raise ValueError when a checksum differs from the written one; 0 is none."""
+    if written not in (0, computed):
+        raise ValueError(f"{what}: checksum {computed:08x}, written was {written:08x}")
 
 
 class Described:
-    """The attachments that went by, for the metadata `CHECKS` behind them."""
+    """The attachments so far, for the metadata `CHECKS` after them."""
 
     def __init__(self) -> None:
         self.digests: dict[str, str] = {}
         self.is_checked = False
-        """Whether that metadata has come, and all before it is what was written."""
+        """Whether that metadata has come, and all before it is intact."""
 
     def take(self, attachment: records.Attachment) -> None:
         """Note one more attachment."""
         self.digests[attachment.name] = digest_of(attachment.data)
 
     def entries(self, before: int) -> dict[str, str]:
-        """Return what `CHECKS` says behind bytes with this checksum."""
+        """Return the entries of `CHECKS` after bytes with this checksum."""
         return {**self.digests, BEFORE: f"{before:08x}"}
 
-    def check(self, told: Mapping[str, str], before: int) -> None:
+    def check(self, written: Mapping[str, str], before: int) -> None:
         """Compare with the values of `CHECKS`. Raises ValueError for the first that differs."""
         for name, value in sorted(self.entries(before).items()):
-            if told.get(name) != value:
+            if written.get(name) != value:
                 what = "the file up to here" if name == BEFORE else f"attachment {name!r}"
-                raise ValueError(f"{what} has digest {value}, written was {told.get(name, 'none')!r}")
-        missing = sorted(told.keys() - self.digests.keys() - {BEFORE})
+                raise ValueError(f"{what} has digest {value}, written was {written.get(name, 'none')!r}")
+        missing = sorted(written.keys() - self.digests.keys() - {BEFORE})
         if missing:
             raise ValueError(f"attachment {missing[0]!r} is missing")
         self.is_checked = True
 
 
 class Span:
-    """The times of the chunk at an offset: those of its head, and those of its indexes."""
+    """The times of the chunk at an offset, by its head and by its indexes."""
 
     def __init__(self, at: int, first_ns: int, last_ns: int) -> None:
         self.at = at
-        self._told = first_ns, last_ns
+        self._head = first_ns, last_ns
         self._first_ns: list[int] = []
         self._last_ns: list[int] = []
 
     def take(self, index: bytes) -> None:
-        """Note an index record. Raises ValueError when it is none."""
+        """Note an index record. Raises ValueError for any other content."""
         channel, size = _INDEX.unpack_from(index)
         entries = array("Q", index[_INDEX.size :])
         if size != 8 * len(entries) or not entries or len(entries) % 2:
@@ -130,7 +130,7 @@ class Span:
 
     def check(self) -> None:
         """Compare, when all indexes have come. Raises ValueError; a chunk without any is not checked."""
-        if self._first_ns and (found := (min(self._first_ns), max(self._last_ns))) != self._told:
-            first_ns, last_ns = self._told
-            told = f"the chunk at byte {self.at} is from {first_ns} to {last_ns} ns"
-            raise ValueError(f"{told}, its indexes from {found[0]} to {found[1]} ns")
+        if self._first_ns and (found := (min(self._first_ns), max(self._last_ns))) != self._head:
+            first_ns, last_ns = self._head
+            head = f"the chunk at byte {self.at} is from {first_ns} to {last_ns} ns"
+            raise ValueError(f"{head}, its indexes from {found[0]} to {found[1]} ns")

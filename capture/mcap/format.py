@@ -88,7 +88,7 @@ Content = Message | records.Metadata | records.Attachment
 
 
 class Damaged(CaptureError):
-    """Bytes that are not what was written."""
+    """Bytes that differ from the written ones."""
 
 
 class ByteSource(Protocol):
@@ -100,7 +100,7 @@ class ByteSource(Protocol):
 
 
 class McapFile:
-    """Reads an MCAP file from start to end. `unfinished_bytes` is what follows the last whole record."""
+    """Reads an MCAP file from start to end. `unfinished_bytes` follow the last whole record."""
 
     def __init__(
         self, stream: BinaryIO, size: int, name: str, since_ns: int = 0, topics: frozenset[str] | None = None
@@ -108,7 +108,7 @@ class McapFile:
         """`topics`: messages of others are passed by; None: all are read.
 
         `since_ns`: chunks whose last message is before that are passed by, if the file declares its channels first.
-        A hub's chunks are in the order of their last messages; what is wanted of them may still be before that time.
+        A hub's chunks are in the order of their last messages; wanted messages may still be before that time.
         """
         self._stream, self._size, self._name = stream, size, name
         self._since_ns, self._wanted = since_ns, topics
@@ -117,7 +117,7 @@ class McapFile:
         self.at = 0
         """The offset of the present record, or of the damaged one."""
         self._crc: int | None = 0
-        """Of all bytes so far, in the summary of those of the summary; None where some were passed by."""
+        """Of all bytes so far, in the summary of its bytes so far; None after skipped bytes."""
         self._known = IN_DATA
         self._described = Described()
         self._span: Span | None = None
@@ -126,9 +126,9 @@ class McapFile:
         """By channel; None where its messages are passed by."""
         self.profile = self.library = ""
         self._ended = self.finished = False
-        """Whether the file's end was reached, and was an end."""
+        """Whether the file's end was reached, and whether it is a regular end."""
         self.unfinished_bytes = 0
-        """Bytes behind the last whole record of an unfinished file."""
+        """Bytes after the last whole record of an unfinished file."""
         self.chunk_starts: array[int] = array("Q")
         self.end_ns = 0
         """Times of the first message of each chunk so far, and of the last of all, passed by or not."""
@@ -184,14 +184,14 @@ class McapFile:
             crc = crc32(content[: -_CRC.size], crc32(RECORD.pack(opcode, len(content)), self._crc))
             compare("the summary", crc, FOOTER_FIELDS.unpack(content)[2])
 
-    def _compare_data(self, computed: int, told: int) -> None:
+    def _compare_data(self, computed: int, written: int) -> None:
         try:
-            compare(f"{self._name}: bytes 0 to {self.at}", computed, told)
+            compare(f"{self._name}: bytes 0 to {self.at}", computed, written)
         except ValueError as error:
-            raise Damaged(f"{error}: one is damaged that no other checksum is of") from None
+            raise Damaged(f"{error}: a byte without another checksum is damaged") from None
 
     def _check_span(self, span: Span) -> None:
-        """Compare the times of a chunk with those of its indexes. Raises Damaged."""
+        """Compare the times of a chunk with its indexes. Raises Damaged."""
         try:
             span.check()
         except ValueError as error:
@@ -199,7 +199,7 @@ class McapFile:
             raise self._damaged(str(error)) from None
 
     def _end_unfinished(self, what: str) -> None:
-        """Stop at a record that is not whole, which nothing whole follows."""
+        """Stop at a torn record, which no whole record follows."""
         self.unfinished_bytes = self._size - self.at
         self._stream.seek(max(0, self._size - len(MAGIC)))
         if self._stream.read(len(MAGIC)) == MAGIC and self.unfinished_bytes:
@@ -209,9 +209,9 @@ class McapFile:
             raise self._damaged(f"{what}, and a whole chunk follows at byte {following}")
 
     def _end(self, rest: bytes) -> None:
-        """Stop at the footer, behind which there is only `rest`."""
+        """Stop at the footer, after which there is only `rest`."""
         if not MAGIC.startswith(rest):
-            raise ValueError("the file does not end behind its footer")
+            raise ValueError("the file does not end after its footer")
         self._ended = True
         self.finished = rest == MAGIC
         self.unfinished_bytes = 0 if self.finished else len(rest)
@@ -288,10 +288,10 @@ class McapFile:
         elif opcode == Opcode.FOOTER:
             self._end(self._stream.read(len(MAGIC) + 1))
 
-    def _check_described(self, told: Mapping[str, str]) -> None:
+    def _check_described(self, written: Mapping[str, str]) -> None:
         if self._crc is None:
-            raise ValueError(f"metadata {CHECKS!r} stand behind a chunk")
-        self._described.check(told, self._crc)
+            raise ValueError(f"metadata {CHECKS!r} follow a chunk")
+        self._described.check(written, self._crc)
 
     def _declare(self, content: bytes) -> None:
         channel = records.Channel.read(_stream(content))
@@ -311,7 +311,7 @@ class McapFile:
             if opcode == MESSAGE:
                 channel, sequence, log_ns, publish_ns = fields(chunk, start)
                 if channel not in topics:
-                    raise ValueError(f"a message of channel {channel}, which is not declared")
+                    raise ValueError(f"a message of channel {channel}, which is undeclared")
                 topic = topics[channel]
                 if topic is not None:
                     yield Message(topic, log_ns, publish_ns, sequence, chunk[start + size : at])
@@ -345,9 +345,9 @@ def unpack_chunk(content: bytes, place: str) -> bytes:
 
 
 def next_chunk(stream: ByteSource, start: int, stop: int) -> int | None:
-    """Return where the first whole chunk stands between two places of a file, by its checksum; None where none does.
+    """Return where the first whole chunk begins between two places of a file, by its checksum; None without one.
 
-    The place in the file is somewhere else behind this.
+    The place in the file is beyond this afterwards.
     """
     mark = _CRC.pack(len(COMPRESSION)) + COMPRESSION.encode()
     before = RECORD.size + CHUNK_FIELDS.size - _CRC.size  # of a chunk's head, before this mark

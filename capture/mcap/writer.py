@@ -122,7 +122,7 @@ class McapWriter:
         chunk += data
 
     def end_chunk(self) -> None:
-        """Compress and write what is collected, with its indexes; nothing if it is empty."""
+        """Compress and write the collected messages, with their indexes; nothing without messages."""
         if not self._chunk:
             return
         chunk, size, offset = bytes(self._chunk), len(self._chunk), self._book.offset
@@ -162,7 +162,7 @@ class McapWriter:
         self._chunk.clear()
 
     def drop_chunk(self) -> int:
-        """Forget what is collected; return how many messages it had."""
+        """Drop the collected messages; return their number."""
         dropped = sum(len(entries) // 2 for entries in self._index.values())
         self._chunk.clear()
         for entries in self._index.values():
@@ -174,7 +174,7 @@ class McapWriter:
         return self._book.offset, self._crc, len(self._book.metadata)
 
     def rewind(self, mark: tuple[int, int, int]) -> None:
-        """Forget metadata and the end that were written behind a mark; the caller cuts them off."""
+        """Remove metadata and the end after a mark from the book; the caller cuts the file."""
         self._book.offset, self._crc, count = mark
         del self._book.metadata[count:]
 
@@ -199,7 +199,7 @@ class McapWriter:
         return b"".join(parts), offsets
 
     def _count(self) -> None:
-        """Note that what is collected is written."""
+        """Note that the collected messages are written."""
         for channel, entries in self._index.items():
             self._book.counts[channel] += len(entries) // 2
             del entries[:]

@@ -87,5 +87,5 @@ def _twice(sensors: dict[str, Any]) -> dict[str, Any]:
 
 
 def _first_of_all(names: dict[str, Any]) -> str:
-    """Return a name that is not taken, and that comes before nearly all others."""
+    """Return a free name that comes before nearly all others."""
     return next(name for name in ("a", *(f"a-{number}" for number in range(len(names)))) if name not in names)

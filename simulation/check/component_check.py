@@ -1,8 +1,8 @@
-"""Checks that the forms of a deployment obey the laws: the number of nodes is nothing, and all memory is in the frame.
+"""Checks that the forms of a deployment obey the laws: any number of nodes is the same, and all memory is in the frame.
 
-The deployment is rehearsed several times; what differs is named with its first tick and slot. A form that remembers
-something in an object, asks a clock, draws from a running generator or by its place among others, sums in the order of
-the file or keeps an entity as a number is found by that, whatever it is.
+The deployment is rehearsed several times; a difference is reported with its first tick and slot. It reveals a form that
+stores state in an object, reads a clock, draws from a running generator or by its place among others, sums in the order
+of the file or stores an entity as a number.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def used_form(text: str, name: str, wanted: str) -> ComponentType:
 
 @dataclass
 class ComponentCheck:
-    """One check of a deployment: what it found is yielded by `broken`, where it is goes to `on_step`.
+    """One check of a deployment: `broken` yields its findings, `on_step` receives its progress.
 
     `files` are the contents of the files that the text names, by path; their digests are in it (`pin_assets`). `run`
     rehearses, from the folder that these files are in.
@@ -123,7 +123,7 @@ class ComponentCheck:
             for frame in alone:
                 found.measure(fitted, frame)
                 for actuators in fitted.together:
-                    found.ask(actuators, frame)
+                    found.command(actuators, frame)
         except ComponentError as error:
             self.has_failed = True
             yield from (*found.differ.values(), str(error))
@@ -204,7 +204,7 @@ def _content(frame: Frame, entity: Entity, slot: str) -> list[float | str]:
 
 
 class _Fitted:
-    """What measures in a deployment, and what can be asked together.
+    """The sensors and actuators of a deployment, and which of them compute together.
 
     `count` is how many sensors there are.
     """
@@ -215,7 +215,7 @@ class _Fitted:
         self._sensors = [one for robot in layout.robots for one in sensors_of(self._deployment, layout, robot)]
         self.sensing = Sensing()
         self.together = _together(self._deployment, layout)
-        """The actuators that can be asked together, by motion and class, in the order of their robots."""
+        """The actuators that compute their set-points together, by motion and class, in the order of their robots."""
         self.count = sum(len(robot.sensors) for robot in self._deployment.robots.values())
 
     def due(self, frame: Frame) -> list[BoundSensor]:
@@ -223,7 +223,7 @@ class _Fitted:
         return [one for one in self._sensors if one.is_due(frame.tick, frame.numbers)]
 
     def readings(self, frame: Frame) -> dict[tuple[str, str], object]:
-        """Return what is measured at a frame, by robot and channel."""
+        """Return the readings at a frame, by robot and channel."""
         due = self.due(frame)
         payloads = self.sensing.sample(due, SensingView(frame.tick, frame.numbers, frame.values))
         return {(sensor.robot, sensor.channel): payload for sensor, payload in zip(due, payloads, strict=True)}
@@ -242,8 +242,8 @@ def _together(deployment: Deployment, layout: Layout) -> list[list[BoundActuator
 
 @dataclass
 class _Compared:
-    """What sensors and actuators give alone and with others, of whom the first difference is kept; and how often each
-    sensor was sampled, how often a number of that was not finite and how often there was a reading."""
+    """Results of sensors and actuators alone and with others, of which the first difference is kept; and how often each
+    sensor was sampled, how often it had a non-finite number and how often there was a reading."""
 
     differ: dict[str, str] = field(default_factory=dict)
     sampled: Counter[str] = field(default_factory=Counter)
@@ -271,34 +271,34 @@ class _Compared:
                     label, f"{label} gives another reading alone than with others, at tick {frame.tick}"
                 )
 
-    def ask(self, actuators: Sequence[BoundActuator], frame: Frame) -> None:
-        """Compare what actuators of one class ask for in a frame, as `measure` does. Raises ComponentError."""
+    def command(self, actuators: Sequence[BoundActuator], frame: Frame) -> None:
+        """Compare the set-points of actuators of one class in a frame, as `measure` does. Raises ComponentError."""
         view = View(frame.tick, ReadOnly(frame.numbers), start=frame.numbers)
         members = [one.actuator for one in actuators]
         what = f"actuators {', '.join(f'{one.channel} of {one.robot}' for one in actuators[:NAMED_MAX])}"
         made = called(what, "", frame.tick, type(members[0]).together, members)
         together = some_together(what, frame.tick, made, members, np.arange(len(members))[::-1])
-        asked = commands_together(what, together, len(actuators), view)[::-1]
-        for one, its in zip(actuators, asked.tolist(), strict=True):
+        set_points = commands_together(what, together, len(actuators), view)[::-1]
+        for one, its in zip(actuators, set_points.tolist(), strict=True):
             label = f"actuator {one.channel} of {one.robot}"
             alone = called(f"actuator {one.channel}", one.robot, frame.tick, one.actuator.command, view)
             if its != [list(motor) for motor in alone]:
                 self.differ.setdefault(
-                    label, f"{label} asks for something else alone than with others, at tick {frame.tick}"
+                    label, f"{label} has other set-points alone than with others, at tick {frame.tick}"
                 )
 
     def broken(self) -> Iterator[str]:
-        """Yield what differs, and the sensors of which no reading is one."""
+        """Yield the differences, and the sensors without a finite reading."""
         yield from self.differ.values()
         for label, count in self.sampled.items():
             if self.not_finite[label] == count:
-                yield f"{label} has a number that is not finite in each of its {count} readings"
+                yield f"{label} has a non-finite number in each of its {count} readings"
 
     def notes(self) -> Iterator[str]:
-        """Yield what may be as it is meant: readings that were not finite, sensors whose readings were all dropped."""
+        """Yield what may be intended: non-finite readings, and sensors whose readings were all dropped."""
         for label, count in self.sampled.items():
             if 0 < self.not_finite[label] < count:
-                yield f"{label} has a number that is not finite in {self.not_finite[label]} of its {count} readings"
+                yield f"{label} has a non-finite number in {self.not_finite[label]} of its {count} readings"
             elif not self.given[label] and not self.not_finite[label]:
                 yield f"{label} never gives a reading: its modifiers drop each of {count}"
 

@@ -77,7 +77,7 @@ class _Shown:
 class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Vector, Vector]):  # type: ignore[misc]
     """Agents of a deployment that act together. All end together: by the reward's class, or cut after the time.
 
-    `agents` are those that exist. One whose last robot is removed is terminated; when one is added it comes back, with
+    `agents` are the present ones. One whose last robot is removed is terminated; when one is added it comes back, with
     an observation.
 
     `infos` have the tick and the simulated time (`tick`, `time_s`). `metadata["render_fps"]` of an environment is the
@@ -154,7 +154,7 @@ class FoosimEnv(_Shown, gymnasium.Env[Vector, Vector]):
         render_mode: str | None = None,
         **arguments: Any,
     ) -> None:
-        """`agent` is the player that acts, by default the first by name of those that could; others as `parallel_env`.
+        """`agent` is the player that acts, by default the first possible one by name; others as `parallel_env`.
 
         Raises as it does.
         """
@@ -203,23 +203,23 @@ def _of(found: Mapping[str, ByAgent], agents: Sequence[str]) -> dict[str, ByAgen
 def parallel_env(deployment: Deployment | str | Path = TABLE, **arguments: Any) -> FoosimParallelEnv:
     """Return a deployment, loaded or in a file, as an environment whose agents act together. Arguments, by keyword:
 
-    * `agents`: the players that act by actions; by default all that command a robot, or `learner`, who commands all
-      robots, where the deployment has no such player. The others act by themselves, as declared.
+    * `agents`: the players that act by actions; by default all that command a robot, or `learner`, which commands all
+      robots, if the deployment has no such player. The others act by themselves, as declared.
     * `rate_hz`: how often agents act (100); a period is whole ticks.
     * `network`: whether packets go through the network that the deployment declares; without, readings arrive at once,
       and so do commands.
-    * `reward`: a class as `Reward` describes it, made with the deployment and the robots of each agent; those of
+    * `reward`: a class as `Reward` describes it, made with the deployment and the robots of each agent; rewards of
       the table are in `foosim.library.table.learning.table_rewards`. By default `Nothing`.
     * `seconds`: the simulated time, more than 0, after which an episode is cut; by default never.
     * `start`: the frame that episodes begin with, a `Frame`, a `Start` or `CAPTURE@12.5s`; by default the first one.
-    * `readings`, `commands`: globs of `robot/channel` that select among what agents hear and command.
-    * `bounds`: least and greatest values of commands by globs of `robot/channel.field`, within those of the actuators.
+    * `readings`, `commands`: globs of `robot/channel` that select among the channels that agents hear and command.
+    * `bounds`: least and greatest values of commands by globs of `robot/channel.field`, within the actuators' limits.
     * `ages`: whether the age of each reading (s) is observed, too; -1 before the first.
     * `sets`: changes of the file's values, as `--set` makes them.
     * `pixels`: width and height of what `render` returns (320, 180).
     * `render_mode`: `rgb_array`, or None.
 
-    Raises DeploymentError, AssetError, UnknownName, BadValue and PlayerError for arguments that are not valid.
+    Raises DeploymentError, AssetError, UnknownName, BadValue and PlayerError for invalid arguments.
     """
     return FoosimParallelEnv(deployment, **arguments)
 

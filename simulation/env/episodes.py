@@ -35,7 +35,7 @@ Robots: TypeAlias = Mapping[str, tuple[str, ...]]
 
 
 class Reward(Protocol):
-    """What an episode begins with, what it is worth, and when it is over.
+    """The reward of an episode: its start values, the reward of each step, and its end.
 
     It belongs to a deployment and its agents; `foosim.library.table.learning` has the ones of the table.
     """
@@ -55,7 +55,7 @@ RewardFactory: TypeAlias = Callable[[Deployment, Robots], Reward]
 
 
 class Nothing:
-    """The reward of a world that has none: 0 for every step, and no end."""
+    """The reward of a world without one: 0 for every step, and no end."""
 
     def __init__(self, deployment: Deployment, robots: Robots) -> None:
         self._rates = dict.fromkeys(robots, 0.0)
@@ -105,7 +105,7 @@ class Episodes:
         sets: Sequence[str] = (),
         pixels: tuple[int, int] = PIXELS,
     ) -> None:
-        """Raises DeploymentError, UnknownName and BadValue for arguments that are not valid; see `parallel_env`."""
+        """Raises DeploymentError, UnknownName and BadValue for invalid arguments; see `parallel_env`."""
         if not isinstance(deployment, Deployment):
             deployment = read_for_stepping(deployment, sets)
         elif sets:
@@ -134,7 +134,7 @@ class Episodes:
             simulation.close()
             raise
         self._jobs: dict[tuple[str, str], tuple[str, Jobs]] = {}
-        """Of each (robot, actuator) whose jobs were asked for: the agent that gives them, and the jobs."""
+        """By (robot, actuator) with jobs: the agent that gives them, and the jobs."""
         self._seed: int | None = None
         self._episode = self._steps = 0
         self._pixels = pixels
@@ -162,7 +162,7 @@ class Episodes:
         return self._jobs[robot, actuator][1]
 
     def _with_jobs(self, packets: dict[str, list[Packet]]) -> None:
-        """Put the commands of jobs in the place of those of actions."""
+        """Replace the commands of actions by the commands of jobs."""
         for pair, (agent, jobs) in self._jobs.items():
             if jobs.job is None or jobs.job.state.has_ended or not self.simulation.agents[agent].exists:
                 continue
@@ -173,7 +173,7 @@ class Episodes:
                 packets.setdefault(agent, []).append(Packet(*pair, payload))
 
     def _hear(self) -> None:
-        """Let jobs hear of how they stand."""
+        """Update the jobs' states from the readings."""
         if self._jobs:
             readings = self.simulation.readings
             for _, jobs in self._jobs.values():
@@ -182,11 +182,11 @@ class Episodes:
     def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> dict[str, Vector]:
         """Begin an episode; return the observations.
 
-        A seed begins a row of episodes: that of the first is the seed itself, those of further ones follow from it.
-        Without one ever, the first has the deployment's. The option `start` is the frame to begin with, instead of that
-        of the environment; without a seed, draws are then the deployment's.
+        A seed begins a row of episodes: the first has the seed itself, further ones follow from it.
+        Without one ever, the first has the deployment's. The option `start` is the frame to begin with, instead of the
+        environment's; without a seed, draws are then the deployment's.
 
-        Raises BadValue for a seed that is none, UnknownName for another option, and as `Simulation.reset` does.
+        Raises BadValue for an invalid seed, UnknownName for another option, and as `Simulation.reset` does.
         """
         for name in options or {}:
             if name != START:
@@ -214,10 +214,10 @@ class Episodes:
         return draw_words(draw_key(base, "episode"), self._episode)[0] & COUNTER_MAX
 
     def step(self, actions: Mapping[str, NDArray[Any]]) -> Stepped:
-        """Take the actions of agents, compute the time to the next ones, and return what that led to.
+        """Take the actions of agents, compute the time to the next ones, and return the result.
 
-        An agent without an action sends nothing: its robots keep their last commands. Nor does one that does not exist.
-        Raises BadValue for an action of another shape or with a number that is not finite, UnknownName for one of no
+        An agent without an action sends nothing: its robots keep their last commands. Nor does an absent one.
+        Raises BadValue for an action of another shape or with a non-finite number, UnknownName for one of no
         agent.
         """
         assert self.is_running, "reset begins an episode"

@@ -24,7 +24,7 @@ BISECTIONS: Final = 80
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An estimate, and between which values it is with 95 %; None where there are too few games to tell."""
+    """An estimate with its 95 % interval, whose bounds are None for too few games."""
 
     value: float
     low: float | None
@@ -148,7 +148,7 @@ def draw(figure: Figure, cells: Cells, labels: tuple[str, str], title: str) -> N
     figure.set_size_inches(11.0, 5.0)
     figure.suptitle(title)
     left, right = figure.subplots(1, 2)
-    left.set_title(f"points of {a} less those of {b}, per game", fontsize="medium")
+    left.set_title(f"points of {a} less points of {b}, per game", fontsize="medium")
     right.set_title(f"points per game: {a} solid, {b} dashed", fontsize="medium")
     longest_ms = max(link.delay_ns for link, _ in cells) / 1e6 or 1.0
     curves: list[tuple[int, str, Callable[[Figures], Interval]]] = [

@@ -1,4 +1,4 @@
-"""The games of a match: who plays, and a rehearsal with the sides' classes, seed and network."""
+"""The games of a match: the two entrants, and a rehearsal with the sides' classes, seed and network."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SIDE: Final = "team"
 
 
 class Entrant(NamedTuple):
-    """One of the two that play: as it was asked for, and its class."""
+    """One of the two entrants: its label as requested, and its class."""
 
     label: str
     path: str
@@ -65,8 +65,8 @@ def seats(deployment: Deployment, file: str) -> dict[str, str]:
     for side in score:
         names = [name for name, player in sorted(deployment.players.items()) if player.parameters.get(SIDE) == side]
         if len(names) != 1:
-            told = ", ".join(names) or "none"
-            raise BadValue(f"{file}: a match needs one player with the parameter `{SIDE}: {side}`; there are: {told}")
+            shown = ", ".join(names) or "none"
+            raise BadValue(f"{file}: a match needs one player with the parameter `{SIDE}: {side}`; there are: {shown}")
         if not deployment.players[names[0]].lockstep:
             raise BadValue(f"{file}: a match is played in lockstep, and players.{names[0]} is free-running")
         found[side] = names[0]
@@ -116,7 +116,7 @@ class Fixture:
 
 @dataclass(frozen=True, slots=True)
 class Game:
-    """One game: its seed, whether the two have changed sides, its network where that is not the deployment's."""
+    """One game: its seed, whether the two have changed sides, its network if it differs from the deployment's."""
 
     seed: int
     is_swapped: bool
@@ -126,7 +126,7 @@ class Game:
 
 @dataclass(slots=True)
 class Played:
-    """Result of a game. Points are those of the first and of the second player; `failed` is empty for one that ended.
+    """Result of a game. Points are of the first and of the second player; `failed` is empty for a finished game.
 
     `away` counts how often a thing was put back that had left its place, as the rules mark it.
     """
@@ -174,7 +174,7 @@ def play(fixture: Fixture, game: Game) -> Played:
 
 
 def points_of(score: Mapping[str, int], *, is_swapped: bool) -> tuple[int, int]:
-    """Return the points of the first and of the second player from those of the two sides."""
+    """Return the points of the first and of the second player from the two sides' points."""
     first, second = score.values()
     return (second, first) if is_swapped else (first, second)
 

@@ -178,7 +178,7 @@ class Playback:
         self._paused = False
 
     def step(self, ticks: int, now_ns: int) -> None:
-        """Publish the entries of so many ticks from here at once, and pause after them. Raises BadValue."""
+        """Publish the entries of the next `ticks` ticks at once, and pause after them. Raises BadValue."""
         if not 1 <= ticks <= STEPS_MAX:
             raise BadValue(f"not a number of ticks, 1 to {STEPS_MAX}", ticks)
         at_ns = self.heading_ns(now_ns)
@@ -186,7 +186,7 @@ class Playback:
         self._step_to_ns = min((at_ns // self._tick_ns + ticks) * self._tick_ns, self.span.last_ns)
 
     def seek(self, time_ns: int, now_ns: int) -> None:
-        """Continue from a captured time, playing or paused as before. Raises BadValue for one that is not played."""
+        """Continue from a captured time, playing or paused as before. Raises BadValue for a time out of the span."""
         if not self.span.first_ns <= time_ns <= self.span.last_ns:
             first, last = format_ns(self.span.first_ns), format_ns(self.span.last_ns)
             raise BadValue(f"not a time that is played, {first} to {last}", format_ns(time_ns))

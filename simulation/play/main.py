@@ -101,7 +101,7 @@ class Stopper:
 def read_span(path: Path, from_ns: int | None = None, until_ns: int | None = None) -> tuple[Span, About]:
     """Return the part of a capture to play, and its metadata, by its chunks' heads alone.
 
-    Raises CaptureError for a file that is no capture, BadValue for times that it does not have.
+    Raises CaptureError for other files, BadValue for times that it does not have.
     """
     scan = Scan(path, limits.COUNTER_MAX)
     for _ in scan.messages():

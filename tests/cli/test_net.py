@@ -238,9 +238,9 @@ def test_a_partition_that_was_asked_for_is_seen_at_sending(capture: CaptureData)
         ("camera:1:a:b", "not a packet, SOURCE:SEQUENCE"),
         ("camra:0", "no packet from this source, 'camra', nearest is 'camera'"),
         ("camera:1", "camera sent no packet of this number, 1"),
-        ("camera:0", "say which one of camera:0:player-blue, camera:0:player-red, 'camera:0'"),
-        ("camera:0:red.goal", "say which one of camera:0:player-blue, camera:0:player-red"),
-        ("camera:0:player-red:7", "say which one of"),
+        ("camera:0", "name one of camera:0:player-blue, camera:0:player-red, 'camera:0'"),
+        ("camera:0:red.goal", "name one of camera:0:player-blue, camera:0:player-red"),
+        ("camera:0:player-red:7", "name one of"),
     ],
 )
 def test_a_packet_that_is_not_there_is_refused(command: Command, path: Path, text: str, problem: str) -> None:

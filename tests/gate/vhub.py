@@ -35,7 +35,7 @@ def _hasty(planting: Planting) -> None:
 
 @register("vHub does not ask again", "who has had no progress asks again (vHub)", 2)
 def _patient(planting: Planting) -> None:
-    planting.swap(HubCore, "_ask_again", lambda self, now_ns: self._retry.requested(now_ns))
+    planting.swap(HubCore, "_request_again", lambda self, now_ns: self._retry.requested(now_ns))
 
 
 @register("vHub does not answer who asks", "supervisor and vHub keep the last 16 ticks", 2)

@@ -119,7 +119,7 @@ def test_what_follows_when_a_node_ends(
         ("exit 1", False, False, "lost supervisor: it ended with exit code 1"),
         ("exit 1", True, True, "lost supervisor: it ended with exit code 1"),
         ("exit 0", True, True, "lost supervisor: it ended with exit code 0"),
-        ("echo run mine cannot go on: no journal; exit 3", True, False, "run mine cannot go on: no journal"),
+        ("echo run mine cannot continue: no journal; exit 3", True, False, "run mine cannot continue: no journal"),
         ("echo MemoryError; exit 1", True, True, "lost supervisor: it ended with exit code 1: too little memory"),
     ],
 )
@@ -230,7 +230,7 @@ def test_one_failure_is_printed_once(launched: Launched) -> None:
             "player-red has not answered tick 101 for 2 s (deadlines.lockstep_fast)",
             "the log of player-red is",
         ),
-        ("vhub", "false", "lost vhub: it cannot go on: no journal", "vhub ended with exit code 1; its log is"),
+        ("vhub", "false", "lost vhub: it cannot continue: no journal", "vhub ended with exit code 1; its log is"),
     ],
 )
 def test_the_log_of_the_process_that_the_reason_names_is_shown(

@@ -359,7 +359,7 @@ def fly_freely(heard: str, *disturbances: tuple[int, Callable[[System], None]]) 
 @pytest.mark.parametrize("kills", [(), (30, *range(47, 55), 81, 100)], ids=["undisturbed", "the vHub is killed"])
 def test_a_free_running_player_hears_who_is_there_and_is_made_anew(kills: Sequence[int]) -> None:
     """As far as a process with a clock of its own can, which acts on what has reached it."""
-    seen = fly_freely("pose", *((tick, lambda system: system.kill_hub("unsaid", 5_000_000)) for tick in kills))
+    seen = fly_freely("pose", *((tick, lambda system: system.kill_hub("unpublished", 5_000_000)) for tick in kills))
     carts, spans, said, slack = PLAYERS["both"], spans_of("cart-3", "cart-4"), said_by_both(seen), 12 if kills else 4
     made = [at for at, (_, calls, _, _) in enumerate(said) if calls == "1"]
     assert len(made) == len(spans) and len(said) > 70, "another one at each coming"

@@ -148,7 +148,7 @@ def test_a_journal_whose_files_began_anew_gives_the_same(monkeypatch: pytest.Mon
     """Heads between the ticks: a fold begins at one of them, and older ones go."""
     monkeypatch.setattr(limits, "CHECKPOINT_TICKS", 7)
     monkeypatch.setattr(journals, "HEADS_KEPT", 22)
-    seen = fly([(100, kill_hub("torn")), (180, kill_hub("unsaid"))], sets=(*SETS, "deadlines.client_back=250 ms"))
+    seen = fly([(100, kill_hub("torn")), (180, kill_hub("unpublished"))], sets=(*SETS, "deadlines.client_back=250 ms"))
     assert_the_same(seen, undisturbed())
 
 
@@ -163,7 +163,7 @@ def test_a_vhub_that_does_not_come_back_ends_the_run_in_order() -> None:
 
 def test_a_node_is_lost_while_the_vhub_is_away() -> None:
     faults: list[Fault] = [
-        (60, kill_hub("unsaid")),
+        (60, kill_hub("unpublished")),
         (60, lambda system: system.later(100 * MS, partial(system.kill, "n2"))),
         (120, lambda system: system.start("n2")),
         (150, lambda system: system.kill("n1")),
@@ -213,7 +213,7 @@ KILLS: Final = st.lists(
 
 @settings(max_examples=5)
 @given(kills=KILLS, weather=st.sampled_from([None, 1, 2]))
-@example(kills=[(5, "unsaid", 1), (6, "torn", 1), (9, "now", 40)], weather=3)
+@example(kills=[(5, "unpublished", 1), (6, "torn", 1), (9, "now", 40)], weather=3)
 def test_whenever_it_is_killed_the_world_is_the_same(kills: list[Any], weather: int | None) -> None:
     """Also on a bus that delays, repeats and loses."""
     bad = Weather(weather, 100_000, 2 * MS, loss=0.02, repeat=0.05) if weather is not None else Weather()
@@ -244,7 +244,7 @@ class _Hasty(HubCore):
 @pytest.mark.parametrize("planted", [_Forgetful, _Hasty])
 def test_a_planted_fault_is_found(planted: type[HubCore]) -> None:
     with pytest.raises(AssertionError):
-        assert_the_same(fly([(73, kill_hub("unsaid"))], hub=planted), undisturbed())
+        assert_the_same(fly([(73, kill_hub("unpublished"))], hub=planted), undisturbed())
 
 
 @pytest.mark.parametrize(("hub_ms", "supervisor_ms"), [(50, 400), (400, 50)])

@@ -144,7 +144,7 @@ def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_late
 
 def test_a_vhub_that_dies_before_the_record_gives_the_player_its_time_again(tmp_path: Path) -> None:
     """And one that dies behind it goes on without the player, whose return is as it would have been."""
-    for ending in ("torn", "unsaid"):
+    for ending in ("torn", "unpublished"):
 
         def also(system: System, ending: Any = ending) -> None:
             system.at_tick(100, lambda: system.later(190 * MS, lambda: system.kill_hub(ending, 50 * MS)))

@@ -226,7 +226,12 @@ def test_who_acts_at_arrival_does_so_on_any_number_of_nodes_and_whoever_dies(
     assert talk(network, 1).run.digests == talk(network, 3).run.digests == usual.run.digests
     monkeypatch.setattr(limits, "CHECKPOINT_TICKS", 7)
     monkeypatch.setattr(journals, "HEADS_KEPT", 2)
-    kills = ((22, kill_hub("now")), (38, kill_hub("torn")), (46, kill_hub("unsaid")), (90, kill_hub("now", 5_000_000)))
+    kills = (
+        (22, kill_hub("now")),
+        (38, kill_hub("torn")),
+        (46, kill_hub("unpublished")),
+        (90, kill_hub("now", 5_000_000)),
+    )
     assert_the_same(talk(network, 2, True, *kills), usual)
 
 

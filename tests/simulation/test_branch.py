@@ -133,7 +133,7 @@ def refusals(captured: Captured, tmp_path: Path) -> Iterator[tuple[str, str, str
     alone = str(captured.alone)
     camera = "robots.camera.sensors={eye: {kind: ball, rate: 100 Hz}}"
     yield f"{alone}@0.7s", "", "no frame of .* at that time, it has frames up to 0.6 s, '700 ms'"
-    yield f"{alone}@soon", "", "--from: the time behind @, not a time .*, 'soon'"
+    yield f"{alone}@soon", "", "--from: the time after @, not a time .*, 'soon'"
     yield str(tmp_path / "nowhere.mcap"), "", "nowhere.mcap: cannot be read, No such file"
     yield __file__, "", "no MCAP file"
     yield f"{alone}@0.1s", "tick=1 ms", "the capture has ticks of 2 ms, the deployment of 1 ms"

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import BadValue, DeploymentError
+from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.mobile.set_points import MotionSetPoints
 from foosim.simulation.check.component_check import ComponentCheck, used_form
@@ -96,6 +97,8 @@ OF_WORLD: Final = "rules={own: {kind: 'own_form:Own'}}"
 @pytest.fixture
 def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder on the path, and on that of further processes."""
+    loader._kept.clear()
+    sys.modules.pop("own_form", None)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     return tmp_path
@@ -104,6 +107,7 @@ def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def broken(planted: Path, source: str, sets: str, *, processes: bool = False, ticks: int = TICKS) -> list[str]:
     (planted / "own_form.py").write_text(HEAD + source)
     sys.modules.pop("own_form", None)
+    loader._kept.clear()  # deployments of the module before have its classes
     invalidate_caches()
     text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, sets])
     check = ComponentCheck(text, TABLE.name, ticks)
@@ -207,7 +211,7 @@ def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monke
     assert list(broken_laws(text, "yard.yaml", 3)) == []
     monkeypatch.setattr(MotionSetPoints, "command", wrong)
     (found,) = broken_laws(text, "yard.yaml", 3)
-    assert found == "actuator motion of r0 asks for something else alone than with others, at tick 1"
+    assert found == "actuator motion of r0 has other set-points alone than with others, at tick 1"
     monkeypatch.setattr(MotionSetPoints, "command", lambda self, view: right(self, view)[1:])
     (found,) = broken_laws(text, "yard.yaml", 3)
     assert "actuators motion of r0, motion of r1, motion of r2" in found and "of the shape (3, motors, 2)" in found
@@ -364,7 +368,7 @@ def checking(*sets: str, ticks: int = 60) -> list[str]:
     ]
 
 
-NEVER: Final = ["sensor own of red.goal has a number that is not finite in each of its 8 readings"]
+NEVER: Final = ["sensor own of red.goal has a non-finite number in each of its 8 readings"]
 
 
 @pytest.mark.parametrize(("value", "said"), [("float('inf')", NEVER), ("1.0 if view.tick else float('inf')", [])])
@@ -385,7 +389,7 @@ def test_readings_that_were_not_finite_or_none_are_noted(planted: Path) -> None:
     assert list(check.broken()) == [] and check.compared == check.sensors - 1
     assert check.notes == [
         "sensor encoder of red.attack never gives a reading: its modifiers drop each of 8",
-        "sensor own of red.goal has a number that is not finite in 4 of its 8 readings",
+        "sensor own of red.goal has a non-finite number in 4 of its 8 readings",
     ]
 
 

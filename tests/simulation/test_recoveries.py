@@ -80,7 +80,7 @@ def test_what_the_result_has_the_capture_has(tmp_path: Path) -> None:
         path,
         (40, lambda system: system.kill("n2")),
         (80, lambda system: system.start("n2")),
-        (120, lambda system: system.kill_hub("unsaid", 300 * MS)),
+        (120, lambda system: system.kill_hub("unpublished", 300 * MS)),
         (150, restart),
         (200, lose_and_restart),
         (230, lambda system: system.start("n2")),

@@ -332,7 +332,7 @@ class Flight:
         for name, process in list(system.processes.items()):
             process.slow_ns = 0
             system.resume(name)
-        stops = [identity for identity, verb in system.people.asked.items() if verb == "stop"]
+        stops = [identity for identity, verb in system.people.verbs.items() if verb == "stop"]
         when_answered(system, stops, self._start_all)
 
     def _start_all(self, system: System) -> None:

@@ -259,7 +259,7 @@ class Laws:
         hold(list(supervisor.state.members) == members, f"healed, only {', '.join(supervisor.state.members)} take part")
         strayed = {robot: owner for robot, owner in supervisor.state.owners.items() if owner != self._chosen[robot]}
         hold(not strayed, f"healed, {strayed} are not where they belong")
-        asked = [identity for identity in system.people.asked if identity not in system.answers]
+        asked = [identity for identity in system.people.verbs if identity not in system.answers]
         hold(not asked, f"{asked} are not answered")
         untold = self._told.keys() - self._captured_told
         hold(not untold, f"losses and returns of ticks {sorted(untold)} are not in the capture")

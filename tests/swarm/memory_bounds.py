@@ -45,7 +45,7 @@ BOUNDS: Final[Mapping[str, int]] = {
     "AirState.on_air": 1 << 14,
     "RadioState.waiting": 1 << 14,  # the capacity of its queue
     "Process.report": limits.CLIENTS_MAX,  # a line a link
-    "Fabric.asked": EVENTS_MAX,
+    "Fabric.requested": EVENTS_MAX,
     "Timeline._events": 2 * EVENTS_MAX,
     "Timeline.settings": 2 * EVENTS_MAX,
     "Timeline.holds": 2 * EVENTS_MAX,

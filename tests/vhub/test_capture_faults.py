@@ -145,7 +145,7 @@ def test_ticks_that_go_back_are_refused(hub_run: HubRun, tmp_path: Path, monkeyp
     for tick in (0, 2, 1):
         writer.keep(hub_run.closings[tick])
     writer.finish()
-    with pytest.raises(CaptureError, match=r"back\.mcap: tick 1 comes behind tick 2"):
+    with pytest.raises(CaptureError, match=r"back\.mcap: tick 1 follows tick 2"):
         open_capture(path)
 
 
@@ -170,7 +170,7 @@ BOMB = zstandard.ZstdCompressor().compress(bytes(1 << 28))
         (chunk_record(10, b"lz4", b""), "compression 'lz4', read are 'zstd' and none"),
         (chunk_record(3, b"", b"abc"), "a damaged record, "),
         (chunk_record(9, b"", struct.pack("<BQ", 5, 1 << 50)), "bytes in a chunk with 0 left"),
-        (chunk_record(31, b"", struct.pack("<BQHIQQ", 5, 22, 77, 0, 0, 0)), "channel 77, which is not declared"),
+        (chunk_record(31, b"", struct.pack("<BQHIQQ", 5, 22, 77, 0, 0, 0)), "channel 77, which is undeclared"),
         (struct.pack("<BQ", 5, CHUNK_BYTES_MAX + 1), "it is longer than the file"),
     ],
 )

@@ -144,7 +144,7 @@ def test_without_its_last_files_a_capture_has_no_end(copied: Path) -> None:
         (copied.parent / f"run_000{number}.mcap").unlink()
     capture = open_capture(copied)
     assert not capture.finished and capture.ticks[-1] == 49 and not read_about(copied).finished
-    assert capture.about.end["goes_on_in"] == "run_0005.mcap"
+    assert capture.about.end["continues_in"] == "run_0005.mcap"
 
 
 def test_a_file_of_another_run_or_without_its_end_is_refused(copied: Path, hub_run: HubRun, tmp_path: Path) -> None:

@@ -107,7 +107,7 @@ def test_a_vhub_whose_journal_contradicts_itself_leaves_its_capture_as_it_was(
 ) -> None:
     path = leave(tmp_path, hub_run, without=40)
     size = path.stat().st_size
-    assert "it cannot go on: " in (told := live(plane, hub_run, tmp_path)) and "does not follow on tick" in told
+    assert "it cannot continue: " in (told := live(plane, hub_run, tmp_path)) and "does not follow on tick" in told
     assert path.stat().st_size == size
     found = recover_capture(path, tmp_path / "journals")
     assert found is not None and "does not follow on tick" in found.problem
@@ -124,8 +124,8 @@ def test_a_vhub_whose_journal_is_damaged_goes_on_over_nothing(hub_run: HubRun, p
     journal.write_bytes(content)
     text = live(plane, hub_run, tmp_path)
     told = re.fullmatch(
-        r"lost vhub: it cannot go on: .*vhub-000001\.journal: byte \d+: record \d+ is damaged, \d+ whole .* after it; "
-        rf"tick (\d+) is the last before it\. A new run begins with the .*up table\.yaml --from {path}@last",
+        r"lost vhub: it cannot continue: .*vhub-000001\.journal: byte \d+: record \d+ is damaged, \d+ whole .* "
+        rf"after it; tick (\d+) is the last before it\. A new run begins with the .*up table\.yaml --from {path}@last",
         text,
     )
     assert told is not None, text

@@ -59,7 +59,7 @@ def test_explain_says_that_there_was_no_room(monkeypatch: pytest.MonkeyPatch, tm
     which = PacketName(flight.source, flight.sequence, flight.destination, flight.copy)
     explained = explain_packet(capture, which)
     assert explained.verdict == "dropped at sending: transit_full (receiver)" and explained.agrees
-    assert explained.steps[-1].text == "what is on its way in the whole run leaves no room for it: transit_full"
+    assert explained.steps[-1].text == "the packets in flight in the whole run leave no room for it: transit_full"
 
 
 def test_a_record_that_is_too_large_is_a_journal_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

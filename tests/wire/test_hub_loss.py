@@ -151,7 +151,7 @@ def test_a_run_whose_vhub_cannot_go_on_ends_in_order_and_says_why(house: House) 
     code, out, err = house.end(up)
     assert code == 1, err
     content = last_json(out)
-    assert content["failed"] and content["reason"].startswith("lost vhub: it cannot go on: ")
+    assert content["failed"] and content["reason"].startswith("lost vhub: it cannot continue: ")
     assert "vhub-000001.journal: no journal of this version" in content["reason"]
     assert err.count("vhub was killed by SIGKILL, not by foosim, starts again") == 1 and "is given up" not in err
     assert re.search(r"vhub ended with exit code 1(, starts again)?; its log is \S+/vhub\.log\n", err), err

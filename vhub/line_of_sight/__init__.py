@@ -1,1 +1,1 @@
-"""What stands between two antennas."""
+"""Obstacles between two antennas."""

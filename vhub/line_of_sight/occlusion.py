@@ -141,7 +141,7 @@ class Still:
         self._boxes = boxes_around([low for low, _ in boxes], [high for _, high in boxes], REACH_M + MARGIN_M)
 
     def crossed(self, line: Line, trace: Trace) -> tuple[Crossing, ...]:
-        """Return what a line crosses of the scenery; `trace` is what is remembered of it, or of one like it."""
+        """Return what a line crosses of the scenery; `trace` is the cache of it, or of a similar line."""
         if trace.still is not self or trace.line != line:
             if trace.still is not self or not trace.covers(line):
                 trace.still = self
@@ -178,7 +178,7 @@ def _reach(body: Body) -> float | Pillar:
 
 
 class Geometry:
-    """A scene as rays meet it: scenery that stands, and the links of bodies, to be placed for each frame."""
+    """A scene as rays meet it: fixed scenery, and the links of bodies, to be placed for each frame."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -291,13 +291,13 @@ A plain tuple, as every line of a frame is compared with each.
 
 
 def pillar(name: str, x: float, y: float, radius: float, low_z: float, high_z: float) -> Pillar:
-    """Return a pillar that is a little larger than what is given."""
+    """Return a pillar that is a little larger than the given one."""
     radius += MARGIN_M
     return name, x, y, radius * radius, low_z - MARGIN_M, high_z + MARGIN_M
 
 
 def pillars_met_by(pillars: list[Pillar], line: tuple[Vector, Vector]) -> list[str]:
-    """Return the names whose pillars a line may pass, seen from above as if it had no ends: it says where to look."""
+    """Return the names whose pillars a line may pass, seen from above as if it had no ends: candidates of a hit."""
     (ax, ay, az), (bx, by, bz) = line
     way_x, way_y = bx - ax, by - ay
     square = way_x * way_x + way_y * way_y

@@ -1,4 +1,4 @@
-"""Where endpoints are and what stands between them, as of the newest committed frame."""
+"""Places of endpoints and what lies between them, as of the newest committed frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from foosim.world.layout import Entity, Layout
 from foosim.world.scene import ORIGIN, UPRIGHT, Body, Quaternion, Vector, rotate, shape_box
 
 VEHICLE: Final = "vehicle"
-"""The tag of robots that drive: their hulls are in the way of waves between others as those of cars are."""
+"""The tag of robots that drive: their hulls attenuate waves between others as hulls of cars do."""
 
 
 class _Robot:
@@ -53,9 +53,9 @@ class World:
         self._down: frozenset[str] = frozenset()
         self._named: list[str] = []
         self._switches = np.zeros(0, np.intp)
-        """Of each robot of that layout: the slot that says whether it is out of service."""
+        """Of each robot of that layout: the slot of whether it is out of service."""
         self._states = b""
-        """What these slots hold in the newest frame."""
+        """Values of these slots in the newest frame."""
         self.turns = 0
         """Grows with every frame."""
 
@@ -113,7 +113,7 @@ class World:
         return velocity(robot.body, robot.entity, self._values())
 
     def vehicle_height_m(self, name: str) -> float | None:
-        """Return how high the hull of a vehicle is, without its antenna (m); None for what is no vehicle."""
+        """Return the height of a vehicle's hull without its antenna (m); None for other robots."""
         robot = self._deployment.robots.get(name)
         if robot is None or not (VEHICLE in robot.tags or VEHICLE in robot.component_type.tags):
             return None
@@ -143,7 +143,7 @@ class World:
         return self._numbers
 
     def _place(self, endpoint: str) -> Vector:
-        """Return where the deployment says that an endpoint without a body is."""
+        """Return the declared place of an endpoint without a body."""
         found = self._standing.get(endpoint)
         if found is None:
             places = (place for glob, place in self._places.items() if fnmatchcase(endpoint, glob))

@@ -239,7 +239,7 @@ class Fabric:
         """The states of links that have had packets."""
         self.radios: dict[RadioKey, RadioState] = {}
         self.airs: dict[str, Air] = {}
-        self.asked: list[tuple[int, str]] = []
+        self.requested: list[tuple[int, str]] = []
         """Events that were requested during the run: the tick, and the event as JSON."""
         self.faults: list[str] = []
         """The failure of a custom link model, which ends the run."""
@@ -260,7 +260,7 @@ class Fabric:
 
     def take(self, tick: int, at_ns: int, text: str) -> None:
         """Add a requested event, as JSON, at a tick."""
-        self.asked.append((tick, text))
+        self.requested.append((tick, text))
         self.timeline.add(event_of(text, at_ns))
 
     def phase_ns(self, source: str) -> int:
@@ -294,13 +294,13 @@ class Fabric:
         links: Sequence[tuple[str, str, str, LinkState]],
         radios: Sequence[tuple[str, str, RadioState]],
         airs: Sequence[tuple[str, AirState]],
-        asked: Sequence[tuple[int, str]],
+        requested: Sequence[tuple[int, str]],
     ) -> None:
         """Restore a snapshot, before any packet is sent."""
         self.states = {(source, destination, name): state for source, destination, name, state in links}
         self.radios = {(endpoint, radio): state for endpoint, radio, state in radios}
         self.airs = {name: Air(state, self.radios) for name, state in airs}
-        for tick, text in asked:
+        for tick, text in requested:
             self.take(tick, tick * self.deployment.tick_ns, text)
 
     def restore_flight(self, flight: Flight) -> None:
@@ -312,7 +312,7 @@ class Fabric:
             self.link(flight.source, flight.destination, flight.channel).restore(flight)
 
     def queue_ns(self, key: LinkKey, now_ns: int) -> int:
-        """Return how long what is sent on a link now waits before its turn comes."""
+        """Return how long (ns) a packet sent on a link now waits before its turn comes."""
         source, destination, name = key
         rule, _, radio = name.partition("/")
         senders = (source + _OWN_QUEUE + destination, rule), (source, radio or rule), (source, "")
@@ -357,7 +357,7 @@ def _sender(source: str, destination: str, profile: Profile) -> RadioKey:
 
 
 def name_of(profile: Profile) -> str:
-    """Return a profile's name: its rule, and the radio where the rule does not say it."""
+    """Return a profile's name: its rule, and the radio if the rule does not imply it."""
     return link_name(profile.rule, profile.radio)
 
 

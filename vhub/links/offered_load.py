@@ -1,7 +1,7 @@
 """The declared load of a deployment: the links that carry packets, and the packets per second of queues and airs.
 
-Sensors are sent to the players that hear them, commands to the robots that a player drives, and what clients say to the
-players that hear it, at a rate that is not declared. Pure: `lint` asks.
+Sensors are sent to the players that hear them, commands to the robots that a player drives, and messages of clients to
+the players that hear them, at an undeclared rate. Pure: used by `lint`.
 """
 
 from __future__ import annotations

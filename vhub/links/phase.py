@@ -1,6 +1,6 @@
 """The phase between sensor and player: where both act at fixed times, it adds to the delay of every packet.
 
-Pure: `lint` asks, and has the delays.
+Pure: used by `lint`, which has the delays.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ def _phases(deployment: Deployment, late_ns: Callable[[Radio], int]) -> Iterator
     """Yield the channels whose age the delay does not explain.
 
     A sample of tick s is there at s + a, with the delay a. The player acts at ticks that leave the remainder `own` by
-    `period`, the sensor those that leave `sampled` by `every`. With g their greatest common divisor, the newest sample
-    has waited for (own - a - sampled) mod g ticks at the least, and for (every - g) / 2 more in the mean: the first is
-    a matter of the phase alone.
+    `period`, the sensor samples at ticks that leave `sampled` by `every`. With g their greatest common divisor, the
+    newest sample has waited for (own - a - sampled) mod g ticks at the least, and for (every - g) / 2 more in the mean:
+    the first is a matter of the phase alone.
     """
     profiles = deployment.profiles()
     tick_ns = deployment.tick_ns
@@ -73,10 +73,10 @@ def _text(phase: Phase, heard: list[Ends], tick_ns: int) -> str:
     age, delay, best = (format_ns(ticks * tick_ns) for ticks in phase)
     player, source, channel = heard[0]
     players = len({name for name, _, _ in heard})
-    who = f"{player} sees" if players == 1 else f"{player} and {players - 1} more see"
+    players_text = f"{player} sees" if players == 1 else f"{player} and {players - 1} more see"
     channels = len({(endpoint, sent) for _, endpoint, sent in heard})
-    what = f"{source} {channel}" + (f" and {channels - 1} more channels" if channels > 1 else "")
+    source_text = f"{source} {channel}" + (f" and {channels - 1} more channels" if channels > 1 else "")
     return (
-        f"{who} {what} {age} old, of which the delay explains {delay}: sensor and player are in step; "
+        f"{players_text} {source_text} {age} old, of which the delay explains {delay}: sensor and player are in step; "
         f"an offset of {best} of the player, or act: arrival, leaves {delay}"
     )

@@ -182,15 +182,14 @@ def summaries(deployment: Deployment) -> list[LinkSummary]:
         if capacity_hz is not None and load_hz > capacity_hz:
             which = "all together offer" if use.settings.is_on_air else "one sender offers"
             warnings.append(
-                f"{which} {load_hz:.0f} packets/s by what is declared; of {SMALL_BYTES} B it carries "
-                f"{capacity_hz:.3g}/s"
+                f"{which} {load_hz:.0f} packets/s as declared; of {SMALL_BYTES} B it carries {capacity_hz:.3g}/s"
             )
         found.append(replace(summary, warnings=tuple(warnings)))
     return found
 
 
 def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
-    """Return the summary of settings; `files` are those that they name, by path."""
+    """Return the summary of settings; `files` are the contents of the files that they name, by path."""
     settings = use.settings
     loss, burst_packets, burst_ns = residual_of(settings)
     mean_ns, sd_ns, p99_ns = delay_of(settings, files)
@@ -439,9 +438,9 @@ def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
         if low_hz <= at_hz <= high_hz and settings.duty_cycle > share:
             yield f"duty_cycle is above the {100.0 * share:g} % that the EU allows at {at_hz / 1e6:g} MHz"
     for key, value in (("rate", settings.rate_bps), ("trace", settings.trace), ("overhead", settings.overhead_bytes)):
-        what = unheeded(key, settings.medium) if value else None
-        if what is not None:
-            yield f"{key} {what}"
+        unused = unheeded(key, settings.medium) if value else None
+        if unused is not None:
+            yield f"{key} {unused}"
     if summary.carried and settings.queue.bytes_max < summary.carried[-1].size:
         yield f"a packet of {summary.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
     if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and has_queue:

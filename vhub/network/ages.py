@@ -1,8 +1,8 @@
 """How old the newest packet of each channel is when its receiver acts: the *age at use*, counted by the vHub.
 
-A link's delay says how late a packet comes; what a controller sees is older by the time until its next turn, and by how
-long ago the newest packet was sent. Counted at each tick at which a lockstep client is due, and of a free-running
-one at each tick that admits packets of it; channels that it hears and of which something has come. Ages are whole
+A link's delay is how late a packet comes; a controller's view is older by the time until its next turn, and by the age
+of the newest packet. Ages are counted at each tick at which a lockstep client is due, and of a free-running
+one at each tick that admits packets of it, for channels that it hears and has received. Ages are whole
 ticks, since all is sent at the start of its tick. Part of the vHub's state.
 """
 

@@ -1,9 +1,9 @@
 """An air: a channel that radios share, with its transmissions, which station receives which, and their interference.
 
 A transmission is registered when it is judged, with the times at which it is on air. It adds its power to the packets
-that overlap with it at their receivers, those that were sent before it and are still on air too; each packet's sum is
-of whole numbers, so no order matters. A station that sends hears nothing meanwhile. Stations that hear one another
-take turns, so they overlap only where they do not. A turn of 802.11 that has not begun is put off by stations that come
+that overlap with it at their receivers, also to earlier ones that are still on air; each packet's sum is
+of whole numbers, so no order matters. A sending station hears nothing. Stations that hear one another
+take turns, so they overlap only where they do not. A turn of 802.11 is put off, until it begins, by stations that come
 in between; what it spoils, and what spoils it, is found when it has begun.
 """
 
@@ -62,7 +62,7 @@ class Air:
         self._heard: list[_Heard] = []
         self._advanced_ns = -1
         self._open: dict[Key, Turn] = {}
-        """The turns that have not begun."""
+        """The turns that are still to begin."""
         self._next_ns = NEVER_NS
         """No turn begins before this time."""
         for known in state.on_air:
@@ -86,7 +86,7 @@ class Air:
     def turn(self, source: str, ready_ns: int, of: Propagation) -> tuple[int, int]:
         """Return when the turn of a station that is ready to send begins, and the number of contenders with it.
 
-        It waits for all that it hears; who has something queued or on air when it is ready contends.
+        It waits for all stations that it hears; stations with a packet queued or on air when it is ready contend.
         """
         place = of.place(source)
         start_ns = ready_ns
@@ -105,8 +105,8 @@ class Air:
     def contest(self, source: str, ready_ns: int, of: Propagation) -> Contest:
         """Return the contention that a station of 802.11 meets when it is ready to send.
 
-        Who has something queued or on air then contends; and, where packets of the station itself wait before this
-        one, who has about as many waiting by now: stations get as many turns as others in the long run.
+        Stations with a packet queued or on air then contend; where packets of the station itself wait before this one,
+        stations with about as many waiting by now: all get the same number of turns in the long run.
         """
         place, now_ns, free_ns, waiting = of.place(source), self._advanced_ns, ready_ns, 1
         hears: dict[str, bool] = {}
@@ -187,12 +187,12 @@ class Air:
         return self._open.get((flight.source, flight.sequence, flight.copy))
 
     def _add_open(self, known: Transmission) -> None:
-        """Add a transmission that has not begun."""
+        """Add a transmission that is still to begin."""
         self._open[known.source, known.sequence, known.copy] = Turn(known, self._senders[known.source, known.radio])
         self._next_ns = min(self._next_ns, known.turn_ns)
 
     def _spoil_others(self, known: Transmission) -> None:
-        """Apply a transmission's interference to those that overlap it."""
+        """Apply a transmission's interference to the overlapping ones."""
         for heard in self._heard:
             if heard.overlaps(known):
                 heard.beside.append(known)

@@ -60,7 +60,7 @@ class Episodes:
         self.end_ns = self._length_ns(0)
 
     def is_bad(self, time_ns: int) -> bool:
-        """Whether a time is a bad one. Later times cost less to ask for than earlier ones."""
+        """Whether a time is a bad one. Queries are cheaper in ascending order of time."""
         if time_ns < self.start_ns:
             self._restart()
         while time_ns >= self.end_ns:

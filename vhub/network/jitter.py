@@ -1,7 +1,7 @@
 """Quantiles of jitter: a table of 4,096 per shape, built by a fixed routine and interpolated to whole nanoseconds.
 
-The upper sixteenth of a shape with a heavy tail is finer: each half of what is left above has 64 cells, so that a
-straight line over any of them hardly differs from the law, however rare what it is about.
+The upper sixteenth of a shape with a heavy tail is finer: each half of the remaining tail has 64 cells, so that a
+straight line over any cell hardly differs from the law, however rare.
 
 The routine uses only + - x / of IEEE doubles (its own exponential and logarithm), so that the table is the same on
 every machine, whatever its mathematical library. Source of the series: Abramowitz and Stegun, Handbook of Mathematical
@@ -36,11 +36,11 @@ CELLS: Final = 4096
 TAIL_CELL: Final = CELLS - CELLS // 16
 """From here on the cells of a heavy tail are finer."""
 HALF_CELLS: Final = 64
-"""Cells of each half of what is left above."""
+"""Cells of each half of the remaining tail."""
 HALVES: Final = 48
-"""How often what is left above is halved: what is rarer than 2^-52 is as great as that."""
+"""How often the remaining tail is halved: rarer values than 2^-52 are as great as that one."""
 GAMMA_HALVES: Final = 24
-"""The same of a gamma distribution: P(a, x) as a float tells no more from 1."""
+"""The same of a gamma distribution: beyond, P(a, x) rounds to 1 as a float."""
 _TAIL_BITS: Final = 60
 _TAIL_WORD: Final = TAIL_CELL << 52
 _HALF_BITS: Final = HALF_CELLS.bit_length()

@@ -199,9 +199,8 @@ Counts = dict[int, int]
 
 
 class HeardState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A channel that a client receives, or has received: when its newest packet was sent, and ages at use.
-
-    Those up to the last row, and those since.
+    """A channel that a client receives, or has received: when its newest packet was sent, and the ages at use up to
+    the last row and since.
     """
 
     source: str
@@ -265,7 +264,7 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     links: list[tuple[str, str, str, LinkState]]
     radios: list[tuple[str, str, RadioState]]
     airs: list[tuple[str, AirState]]
-    asked: list[tuple[int, str]]
+    requested: list[tuple[int, str]]
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
     ages: list[tuple[str, list[HeardState]]]

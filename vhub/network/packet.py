@@ -39,7 +39,7 @@ class Flight:
         published: bool = False,
         copy: int = 0,
     ) -> None:
-        """It draws by its sequence number, as a client's does: who makes a robot's packet sets `draw` and `count`."""
+        """It draws by its sequence number, as a client's does; for a robot's packet the caller sets `draw`, `count`."""
         self.source, self.destination, self.channel = source, destination, channel
         self.sequence, self.sent_ns, self.stamp_ns, self.payload = sequence, sent_ns, stamp_ns, payload
         self.published, self.copy = published, copy

@@ -1,7 +1,7 @@
 """The time line of a network: partitions, clogs and changed settings, as functions of simulated time.
 
-It is made from the deployment's events and from requests during the run, in the order of time; every
-random length is drawn from (seed, number of the event), so that the same time line comes out wherever it is made.
+It follows from the deployment's events and from requests during the run, in the order of time; every
+random length is drawn from (seed, number of the event), so that the time line is the same wherever it is computed.
 What lasts ends at the next `heal` at the latest.
 """
 
@@ -69,7 +69,7 @@ class Timeline:
         self._seed = seed
         self._events = [(event, f"event {number}") for number, event in enumerate(network.events)]
         """Each with what its draws are for: the same, whatever is added."""
-        self._asked = 0
+        self._requests = 0
         self.cuts: list[Cut] = []
         self.holds: list[Hold] = []
         self.settings: list[Settings] = []
@@ -79,8 +79,8 @@ class Timeline:
 
     def add(self, event: Event) -> None:
         """Add a requested event; it is not earlier than any judged packet."""
-        self._events.append((event, f"request {self._asked}"))
-        self._asked += 1
+        self._events.append((event, f"request {self._requests}"))
+        self._requests += 1
         self._compile()
 
     def _compile(self) -> None:
@@ -128,7 +128,7 @@ class Timeline:
             named.append(members)
         return tuple(frozenset(left) if group is None else group for group in named)
 
-    # --- what links ask ----------------------------------------------------------------------------------------------
+    # --- queries of links --------------------------------------------------------------------------------------------
 
     def cuts_of(self, source: str, destination: str) -> list[tuple[int, int]]:
         """Return the times in which the link is cut, by start."""

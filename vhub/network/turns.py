@@ -1,11 +1,11 @@
 """Whose turn it is on a channel of 802.11: stations count down while it is idle, and freeze while another one sends.
 
 A station that becomes ready counts down from the slots of backoff that its packet has drawn. What it hears stops the
-count, and takes one slot of it, as in Bianchi's chain; at its end the station has its turn. So who wins is whose
-counter is the first at its end, and who has just won draws anew from the least window: a station may win several times
-in a row, and one whose attempts failed waits for long. Turns are found when a packet is sent, from those that are known
-by then; the turns of stations that were to come later are put off by one that comes in between, until they begin. What
-has begun stays.
+count, and takes one slot of it, as in Bianchi's chain; at its end the station has its turn. So the station whose
+counter ends first wins, and draws anew from the least window: a station may win several times
+in a row, and one whose attempts failed waits for long. Turns are found when a packet is sent, from the packets known
+by then; the turns of stations that were to come later are put off by one that comes in between, until they begin. A
+turn that has begun stays.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PutOff = Callable[[Flight, int, dict[int, int]], None]
 
 
 class Turn:
-    """A turn that has not begun, with its sender's radio and its packets."""
+    """A turn that is still to begin, with its sender's radio and its packets."""
 
     __slots__ = ("known", "packets", "sender")
 
@@ -95,11 +95,11 @@ class Contest:
         return at_ns + backoff_ns
 
     def put_off(self, turn_ns: int, busy_ns: int, slot_ns: int, of_all: dict[tuple[str, int, int], Turn]) -> None:
-        """Defer the turns after one of the station that takes `busy_ns`; `of_all` are all turns that have not begun.
+        """Defer the turns after one of the station that takes `busy_ns`; `of_all` are all turns that are to come.
 
         They are frozen meanwhile, less the slot of their own countdown that it takes, and less the time for which a
-        station was not ready yet. Who does not hear this station is put off as far as it hears one that is: of two that
-        have not begun the later one knows whether they hear each other.
+        station was not ready yet. A station that does not hear this one is put off as far as it hears one that is: of
+        two turns to come the later one knows whether they hear each other.
         """
         later = [turn for turn in self._turns if turn.known.turn_ns > turn_ns]
         if not later:
@@ -107,7 +107,7 @@ class Contest:
         first = later[0].known
         most_ns = busy_ns - min(slot_ns, first.turn_ns - max(first.ready_ns, turn_ns))
         heard = {turn.known.source for turn in later}
-        if len(of_all) > len(self._turns):  # of those that it hears all are in `_turns`
+        if len(of_all) > len(self._turns):  # `_turns` has all turns of the stations that it hears
             hears = set(self.hears)
             others = [
                 turn for turn in of_all.values() if turn.known.turn_ns > turn_ns and turn.known.source not in hears

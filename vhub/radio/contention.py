@@ -29,7 +29,7 @@ from foosim.common.keyed_random import chance_threshold
 from foosim.vhub.radio.timings import LRWPAN, LrwpanTiming, WifiTiming
 
 CONTENDERS_MAX: Final = 200
-"""Of what is tabled; more count as that many."""
+"""The largest tabled count of stations; greater ones count as this."""
 TURNS_SAVED: Final = 0.8
 """By how many turns of others a station waits less after each of its collisions, since the one that it collided with
 waits in a doubled window, too. Judgement: fitted to a slot simulation of 2 to 20 stations (`tests/links/dcf.py`)."""
@@ -72,11 +72,11 @@ class Contention:
     threshold: int
     """An attempt collides when its word is below this."""
     collision_share: float
-    """Of a collision that one has part in: one over the mean number of those that share it, weighted by part."""
+    """Of a collision that one has part in: one over the mean number of its stations, weighted by part."""
     busy_without: float
     """The probability that a slot is busy while one waits in a window that was doubled: others contend as n - 1."""
     quiet_slots: float
-    """How many slots of its countdown a collision spares a station: turns that whom it collided with does not have."""
+    """How many slots of its countdown a collision spares a station: turns that its collision partners do not have."""
 
 
 def _power(base: float, exponent: int) -> float:
@@ -248,7 +248,7 @@ def sensing(contenders: int, airtime_ns: int, unicast: bool, timing: LrwpanTimin
     is the share of the others' cycles on the air, given that one does not send, by bisection. Who looks within a
     turnaround of the first to find the channel free sees nothing and collides with it: with l such in the mean, groups
     of 1 + Poisson(l) send at once, and an attempt is alone with exp(-l) / (1 + l). Where many wait, the next one is on
-    the air before the group that sent last is back: it is not among those who look, and its first looks are in vain.
+    the air before the group that sent last is back: that group does not look then, and its first looks are in vain.
     Judgement, compared with a simulation of the stations: within an eighth of its throughput for up to 20 stations, too
     low by a sixth for 30, and for 50 by up to a third where frames are long.
     """

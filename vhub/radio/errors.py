@@ -1,8 +1,8 @@
 """Whether a frame of some size gets through: error probabilities by signal to noise ratio, as thresholds for a draw.
 
 A ratio is given in whole hundredths of a dB and an answer is an integer t: the frame is in error when its 64-bit word
-is below t. So the last bit of a mathematical library decides nothing, but for one draw in 2^50. Sizes are of all that
-must be whole: what is sent plus the headers that the medium adds (`airtime.WIFI_OVERHEAD_BYTES` and its like).
+is below t. So the last bit of a mathematical library decides nothing, but for one draw in 2^50. Sizes are of the whole
+transmission: the payload plus the headers that the medium adds (`airtime.WIFI_OVERHEAD_BYTES` and its like).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Mode:
 
     @property
     def control_bits(self) -> int:
-        """Of the frame that answers it: the highest mandatory rate (6, 12, 24 Mb/s) that is not above its own."""
+        """Of the frame that answers it: the highest mandatory rate (6, 12, 24 Mb/s) up to its own."""
         if self.points == 2:
             return 24
         return 48 if self.points == 4 else 96

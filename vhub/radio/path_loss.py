@@ -192,10 +192,10 @@ def path_loss_db(
     walls_db: float,
     has_hit: bool,
 ) -> tuple[float, bool]:
-    """Return the loss in dB and whether the curve without line of sight is what decided it.
+    """Return the loss in dB and whether the curve without line of sight decided it.
 
     No ray hit: line of sight. Otherwise min(line of sight + walls, no line of sight); an environment with one curve has
-    no such limit. The second value chooses `sigma_*` and `d_corr_*`: behind a pane of glass the direct ray still
+    no such limit. The second value chooses `sigma_*` and `d_corr_*`: through a pane of glass the direct ray still
     dominates, and the shadowing is that of line of sight.
     """
     heights_m = (tx_height_m, rx_height_m)
@@ -240,7 +240,7 @@ def vehicle_blockage_db(
 ) -> float:
     """Return what a vehicle between two vehicles takes away, in dB, to be added to the loss with line of sight.
 
-    Nothing when both antennas stand above it; else a log-normal number of mean 9 dB and standard deviation 4.5 dB (both
+    Nothing when both antennas are above it; else a log-normal number of mean 9 dB and standard deviation 4.5 dB (both
     below its height) or 5 and 4 (one below), the mean plus max(0, 15 lg d - 41). `word` is the draw: one for a pair and
     a blocker, not one for each packet. Source: 3GPP TR 37.885, 6.2.1. A car is 1.6 m high, a lorry 3 m.
     """

@@ -54,7 +54,7 @@ def _is_behind(a: Vector, b: Vector) -> bool:
 
 
 class Path:
-    """A signal's way between two places, levels in 0.01 dB. `cause` says that nothing gets through, and why."""
+    """A signal's way between two places, levels in 0.01 dB. `cause` is why nothing gets through, or empty."""
 
     __slots__ = ("cause", "distance_mm", "loss_cdb", "shadowing_cdb", "walls", "walls_cdb")
 
@@ -217,9 +217,9 @@ class Propagation:
         return way.path
 
     def hears(self, one: Place, other: Place, power_cdbm: int) -> bool:
-        """Whether who is at the other place senses what is sent with a power at the one.
+        """Whether a station at the other place senses a signal sent with a power at the one.
 
-        That is what the path says; where walls cannot change it, it is known without looking for them.
+        The path decides; where walls cannot change the result, they are not searched.
         """
         sensed_cdb = power_cdbm + self.gain_cdb - self.sense_cdbm
         if self._is_limited and self._is_near(one, other, sensed_cdb):

@@ -2,8 +2,8 @@
 
 A unit Gaussian field F over the horizontal plane is the sum of three lattices, whose pitches and weights are tuned so
 that its autocorrelation follows exp(-distance / d_corr) within 0.05. A node's value is a keyed draw of its lattice
-and cell, so the field has no order of asking; what it remembers of its cells changes nothing. The height is left out:
-d_corr was measured along streets and corridors, and what casts a shadow there stands upright.
+and cell, so the field does not depend on the order of queries; its cache of cells changes nothing. The height is left
+out: d_corr was measured along streets and corridors, and obstacles that cast a shadow there are upright.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ LATTICES: Final = ((0, 1.0 / 0.25), (1, 1.0 / 1.0), (2, 1.0 / 2.8))
 ROOT_WEIGHTS: Final[tuple[float, ...]] = (sqrt(0.3), sqrt(0.4), sqrt(0.3))
 """Square roots of each lattice's share of the variance."""
 CELLS_KEPT: Final = 16_384
-"""Of each lattice, at most: a robot that moves about in a cell asks for it again and again."""
+"""Of each lattice, at most: a robot that moves about in a cell reads it again and again."""
 CELL_MAX: Final = 1 << 29
 """Of cells that are further away nothing is remembered."""
 _LOW_32: Final = 0xFFFF_FFFF

@@ -71,7 +71,7 @@ CATEGORIES: Final[Mapping[str, tuple[int, int, int]]] = MappingProxyType(
         "voice": (2, 3, 7),
     }
 )
-"""AIFSN, cw_min and cw_max of those of 802.11's access categories that a radio may have, with cw_min 15.
+"""AIFSN, cw_min and cw_max of the access categories of 802.11 that a radio may have, with cw_min 15.
 
 Source: ns-3's wifi-mac (best effort and voice were read there; video is recalled, unverified).
 """

@@ -1,9 +1,9 @@
 """Watches the disk space of the vHub's capture, and of its journal, without which no run continues.
 
-It says once what gets little, and when the run has to end: while what is left to be written still fits. While one
-`fdatasync` of a capture that is closed lasts, nothing else moves: whether the disk goes on is told by what the kernel
-has written of a block device. Of what has no such account (a network file system, memory) the call itself counts: it
-ends, or fails, when the kernel says so.
+It reports once that disk space is low, and when the run has to end: while the rest still fits. While the
+last `fdatasync` of a capture lasts, nothing else moves: progress of the disk is what the kernel
+has written of a block device. Without such an account (a network file system, memory) the call itself counts: it
+ends, or fails, when the kernel returns.
 """
 
 from __future__ import annotations
@@ -63,25 +63,25 @@ class RoomWatch:
 
     def look(self, now_ns: int) -> list[tuple[str, str]]:
         """Return new log lines as (level, text)."""
-        said = []
+        entries = []
         while self._capture is not None and self._capture.states:
-            said += self._tell(self._capture.states.popleft(), self._capture.stops_world)
+            entries += self._entries(self._capture.states.popleft(), self._capture.stops_world)
         if now_ns >= self._look_ns:
             self._look_ns = now_ns + LOOK_NS
-            said += self._look_at_journal()
-        return said
+            entries += self._look_at_journal()
+        return entries
 
-    def _tell(self, state: CaptureState, stops_world: bool) -> list[tuple[str, str]]:
+    def _entries(self, state: CaptureState, stops_world: bool) -> list[tuple[str, str]]:
         """Handle a new state of the capture."""
         before, self._level = self._level, state.level
         if state.level is Level.LOW:
-            then = "the run ends" if stops_world else "the run goes on without its capture"
+            then = "the run ends" if stops_world else "the run continues without its capture"
             return [("warning", f"room gets little, at the reserve {then}: {state.text}")]
         if stops_world:
             if before < Level.FULL:
                 self.ends = ("the capture", state.text)
             return [("error", f"not captured further: {state.text}")] if state.level is Level.OUT else []
-        return [("error", f"the run goes on without its capture: {state.text}")]
+        return [("error", f"the run continues without its capture: {state.text}")]
 
     def _look_at_journal(self) -> list[tuple[str, str]]:
         try:

@@ -1,8 +1,8 @@
-"""One hash of the network's model as it is in force: what is configured, presets resolved, and what the formulas give.
+"""One hash of the network's model in force: its configuration, presets resolved, and results of its formulas.
 
-Two captures with one hash were judged by the same model. What the formulas give is looked at where their results are
+Two captures with one hash were judged by the same model. Results of formulas are hashed where they are
 rounded anyway (0.01 dB, parts per million, ns), so machines whose mathematical libraries differ in the last bit agree.
-The world with its materials is not in it, and a link model of one's own by name and parameters alone: the deployment
+The world with its materials is excluded, and a custom link model counts by name and parameters alone: the deployment
 and the versions beside it in the capture have these.
 """
 

@@ -1,4 +1,4 @@
-"""The vHub's capture: what its description says of the network, and closings as the ticks that a capture takes."""
+"""The vHub's capture: its description of the network, and closings as the ticks that a capture takes."""
 
 from __future__ import annotations
 

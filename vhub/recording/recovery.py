@@ -1,8 +1,8 @@
 """Makes a new, valid capture from an unfinished one: its valid chunks, and the records of the vHub's journal.
 
 The vHub writes its journal before its capture, so the journal has what the capture lacks: the ticks, frames, packets
-and fates behind the last chunk, and what was in flight. What only a clock or a person knew is not in it: fields that
-begin with `wall_` are 0 in completed rows (but outages, which commits tell), lines of the log that were not flushed
+and fates after the last chunk, and the packets in flight. It lacks what only a clock or a person knew: fields that
+begin with `wall_` are 0 in completed rows (but outages, which commits report), lines of the log that were not flushed
 are gone.
 """
 
@@ -44,8 +44,8 @@ UNCLEAN: Final = "unclean end"
 class Recovered:
     """The result of a recovery: `path` from `source`. `tick` is the last tick, -1 when there is none.
 
-    `torn_bytes` stand in `source` behind its last whole chunk; `added_ticks` came from the journal; `problem` says what
-    `source` lacks that no journal told.
+    `torn_bytes` follow the last whole chunk of `source`; `added_ticks` came from the journal; `problem` is what
+    both `source` and its journal lack.
     """
 
     source: Path
@@ -110,7 +110,7 @@ def check_finished(path: Path) -> None:
 
 
 def _recover(about: About, records: Iterable[bytes], out: Path) -> Recovered:
-    """Write the new file: the rows that are there, and those that the journal has beyond them."""
+    """Write the new file: the rows of the old one, then those of the journal beyond them."""
     check_new(out)
     deployment = deployment_of(about)
     cut = {key: about.metadata[key] for key in (CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN) if key in about.metadata}
@@ -158,7 +158,7 @@ class _Completion:
             return
         last: tuple[HubState, Closing] | None = None
         try:
-            for last in fold(self._deployment, self._told_of(file)):
+            for last in fold(self._deployment, self._folded(file)):
                 file.write(tick_of(last[1], self._plan))
                 file.end_large_chunk()
         except (Malformed, JournalError) as error:
@@ -172,7 +172,7 @@ class _Completion:
             end = Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages)
             file.write(tick_of(end, self._plan))
 
-    def _told_of(self, file: CaptureFile) -> Iterator[bytes]:
+    def _folded(self, file: CaptureFile) -> Iterator[bytes]:
         """Yield the records, and write the epochs among them that the file lacks."""
         for raw in chain([self._head], self._records):
             record = decode_any(HubRecord, raw)

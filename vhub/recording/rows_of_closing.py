@@ -65,7 +65,7 @@ def plan_of(deployment: Deployment) -> Plan:
 
 
 def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
-    """Return the rows of one closing, except those of packets (`packet_entry`), which are written after them.
+    """Return the rows of one closing except packets (`packet_entry`), which are written after them.
 
     `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
     known already: then its packets alone are new.
@@ -91,8 +91,8 @@ def _age_entry(age: Age, tick_ns: int) -> Entry:
     p50, p99 = quantile(age.counts, 0.5), quantile(age.counts, 0.99)
     counts = [age.counts[ticks] for ticks in ages]
     figures = sum(counts), p50 * tick_ns, p99 * tick_ns, ages[-1] * tick_ns
-    who = age.client, age.source, age.channel
-    row = AgeRow(age.tick, *who, *figures, [ticks * tick_ns for ticks in ages], counts)
+    key = age.client, age.source, age.channel
+    row = AgeRow(age.tick, *key, *figures, [ticks * tick_ns for ticks in ages], counts)
     return AGES, age.tick * tick_ns, age.tick * tick_ns, age.tick & 0xFFFF_FFFF, row
 
 
@@ -119,7 +119,7 @@ def tick_of(closing: Closing, plan: Plan) -> Tick:
 
 
 def _log_time(flight: Flight) -> int:
-    """Return when a packet was sent: those of a closing arrive in another order, by their due times."""
+    """Return when a packet was sent; packets of a closing arrive in another order, by their due times."""
     return flight.sent_ns
 
 

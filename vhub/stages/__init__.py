@@ -1,6 +1,6 @@
 """The stages of a link, in their fixed order: a table that the hub walks.
 
-Each stage is one file with a class (`stage.Stage`) that is made from a link's setup. It has two hooks, at sending and
+Each stage is one file with a class (`stage.Stage`), constructed with a link's setup. It has two hooks, at sending and
 at arrival; a hook that drops the packet returns the name of the cause. A stage that has nothing to do on a link is left
 out there.
 What a stage remembers is a plain value in the hub's state: of the link, of the sender's radio or of the air. To add

@@ -1,7 +1,7 @@
 """Admission: drops packets that are too long for the link, and those of a sender that is out of service.
 
-By radio or by wire: who is on board of a body that is out of service has no power. Links are made anew when a body goes
-out of service (`Fabric.turn_to`), so that the others need not ask.
+By radio or by wire: endpoints on board of a body that is out of service have no power. Links are made anew when a body
+goes out of service (`Fabric.turn_to`), so that the others need not check.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The channel: whether a signal that was sent is strong enough at its receiver, and clear of the others'.
 
-At sending it says what the medium has found out for a unicast, and judges the rest by the draw for errors; at arrival
-it judges again what others spoiled that began later: broadcasts, and whatever is not sent again.
+At sending it reports the medium's outcome of a unicast, and judges the rest by the draw for errors; at arrival
+it judges again broadcasts and packets without repeats, which a later transmission may have spoiled.
 """
 
 from __future__ import annotations
@@ -109,9 +109,9 @@ class Channel(Stage):
                 note.text += f", others at SF{factor} {dbm:g} dBm: {ratio_db:g} dB over them of {needed_db} dB needed"
 
     def _walls(self, seen: Seen) -> dict[str, float | None]:
-        """Return what is in the way, with what each takes in dB; None where it is not known any more.
+        """Return the obstacles on the way, with the loss of each in dB; None where they are not known any more.
 
-        Bodies move: the newest captured frame before the packet tells, if what it says adds up to what the row has.
+        Bodies move: the newest captured frame before the packet counts, if its losses add up to the row's.
         """
         row, of = seen.row, self._budget.propagation
         frame = seen.evidence.frame(seen.tick) if row.walls else None

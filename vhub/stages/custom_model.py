@@ -120,7 +120,7 @@ def problem_of(answer: object) -> str:
 
 
 def _unplain(value: Any, depth: int) -> str:
-    """Return the first part of a memory that is no plain value: a journal restores only these unchanged."""
+    """Return the first part of a memory without a plain type: a journal restores only plain values unchanged."""
     if isinstance(value, int):
         return "" if -(2**63) <= value < 2**64 else "memory has a whole number of more than 64 bits"
     if value is None or isinstance(value, str):

@@ -86,7 +86,7 @@ class Delay(Stage):
             "reordered": self._extra_ns if self.is_late(seen.flight) else 0,
             "clog": row.held_ns,
         }
-        parts["order, behind the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
+        parts["order, after the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
         note.facts = {what: ns for what, ns in parts.items() if ns}
         text = " + ".join(f"{what} {exact(ns)}" for what, ns in note.facts.items()) or "no delay"
         note.add("{} = due {due_ns}", text, due_ns=row.due_ns)
@@ -99,7 +99,7 @@ class Delay(Stage):
     def put_off(self, flight: Flight, by_ns: int, last_ns: dict[int, int]) -> None:
         """Delay a packet; `last_ns` are the due times of the deferred ones before it, by link.
 
-        It is called in the order of sending, also for later packets that are not deferred.
+        It is called in the order of sending, also for later packets without deferral.
         """
         free_ns = flight.due_ns - flight.held_ns + by_ns
         due_ns = self._held_ns(free_ns) if self._holds else free_ns

@@ -35,7 +35,7 @@ def packets_an_hour(share: float, window_ns: int, airtime_ns: int) -> int:
 
 
 class Duty(Stage):
-    """Drops a packet that exceeds the airtime of the window that ends with it; the medium adds what is sent.
+    """Drops a packet that exceeds the airtime of the window that ends with it; the medium adds transmissions.
 
     Transmissions of a radio come one after the other, so no window has more on air than the one that ends with one.
     """

@@ -21,14 +21,14 @@ from foosim.world.frame import Frame
 class Evidence:
     """The context of a row: a capture, or the recent state of a running system.
 
-    `versions` are those of libraries and link models by name, `asked` the events of the network that were requested:
+    `versions` are the versions of libraries and link models by name, `requested` the requested events of the network:
     ticks and JSON. `frame(tick)` is the newest frame at or before a tick, None where there is none, and `clients()` has
     joins and leaves in their order.
     """
 
     deployment: Deployment
     versions: Mapping[str, str]
-    asked: Sequence[tuple[int, str]]
+    requested: Sequence[tuple[int, str]]
     frame: Callable[[int], Frame | None]
     clients: Callable[[], Iterable[Row]]
 

@@ -1,8 +1,8 @@
 """The medium: access time, airtime and outcome of a transmission, by kind of medium.
 
-A wire serialises. On Wi-Fi a station freezes its backoff while those that it hears send, contends with them, and
-repeats what is not acknowledged: others appear as delay to unicasts, and as loss to broadcasts, which are sent once.
-IEEE 802.15.4 looks before it sends. LoRa sends at once. What is out of range is on air all the same.
+A wire serialises. On Wi-Fi a station freezes its backoff while stations that it hears send, contends with them, and
+repeats unacknowledged frames: others appear as delay to unicasts, and as loss to broadcasts, which are sent once.
+IEEE 802.15.4 looks before it sends. LoRa sends at once. Frames that are out of range are on air all the same.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ class OnAir(Stage):
             return
         chance = odds[0] / UNIT
         note.facts |= {"collision_chance": chance, "attempts": (attempts := [*self._attempts(seen, *odds)])}
-        runs = [(what, len([*those])) for what, those in groupby(attempts)]
+        runs = [(what, len([*equal])) for what, equal in groupby(attempts)]
         note.text += "; " + ", ".join(what if count == 1 else f"{count} x {what}" for what, count in runs)
         note.text += f" (an attempt collides with {chance:g})" if chance else ""
 
@@ -226,7 +226,7 @@ class OnAir(Stage):
         return start_ns
 
     def expect(self, known: Transmission, ready_ns: int, turn_ns: int) -> None:
-        """Record what a later transmission needs to defer a turn that has not begun."""
+        """Record what a later transmission needs to defer a turn that is still to begin."""
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
         """Return when the sender's turn begins, and the number of contenders, itself included."""
@@ -287,7 +287,7 @@ Curve = Callable[[Flight, int], int]
 
 
 def error_curve(settings: Radio) -> Curve | None:
-    """Return the curve of a radio's errors; None on media that have none."""
+    """Return the curve of a radio's errors; None on media without errors."""
     if settings.medium == "wifi":
         modes = {errors.MODES[mode].rate_bps: mode for mode in wifi_modes(settings)}
         return lambda flight, snr_cdb: errors.per_threshold(

@@ -1,7 +1,7 @@
 """Policy: partitions, filters, and how old a packet may be.
 
-A partition is looked at when a packet is sent and when it arrives, so that what is on its way when it begins is lost,
-unless the deployment says `in_flight_on_partition: deliver`.
+A partition is checked when a packet is sent and when it arrives, so that packets in flight when it begins are lost,
+unless the deployment has `in_flight_on_partition: deliver`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ EXPIRED: Final = "expired"
 
 
 class Policy(Stage):
-    """Drops packets while the link is cut or filtered, and those that are too old."""
+    """Drops packets while the link is cut or filtered, and packets that are too old."""
 
     def __init__(self, setup: LinkSetup) -> None:
         self._cuts, self._at_arrival = setup.cuts, setup.in_flight_dropped

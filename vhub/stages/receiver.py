@@ -12,7 +12,7 @@ from foosim.vhub.stages.stage import Stage
 
 RECEIVER_DOWN: Final = "rx_down"
 RECEIVER_FULL: Final = "rx_full"
-"""The packets of a receiver at one tick are one message: those that exceed its size are dropped."""
+"""The packets of a receiver at one tick are one message: packets beyond its size are dropped."""
 TRANSIT_FULL: Final = "transit_full"
 """Found at sending: there is a limit of bytes in flight in the whole run."""
 
@@ -30,7 +30,7 @@ class Receiver(Stage):
     def explain(self, seen: Seen, note: Explanation) -> None:
         row, decided = seen.row, seen.row.decided_by
         if row.cause == TRANSIT_FULL:
-            note.add("what is on its way in the whole run leaves no room for it", due_ns=row.due_ns)
+            note.add("the packets in flight in the whole run leave no room for it", due_ns=row.due_ns)
             return
         note.add("due {due_ns}, arrives at tick {arrival_tick}", due_ns=row.due_ns, arrival_tick=row.arrival_tick)
         if row.cause == RECEIVER_DOWN:

@@ -31,7 +31,7 @@ class RecordEpoch:
 
 
 class CaptureQueue:
-    """The closings that are not recorded yet, oldest first."""
+    """The closings that are still to be recorded, oldest first."""
 
     def __init__(self) -> None:
         self._closings: deque[Closing] = deque()
@@ -54,8 +54,7 @@ def last_closings(
     """Return the last closings of a run: the tick that is half closed, with its fates, and all committed frames after
     it, up to `end_tick`; the last one has the packets in flight.
 
-    Nodes run ahead of closings as far as deliveries allow, so there may be many. Ticks that are
-    not closed have no fates.
+    Nodes run ahead of closings as far as deliveries allow, so there may be many. Open ticks have no fates.
     """
     closings = [] if half_closed is None else [half_closed]
     for tick in range(state.closed + len(closings) + 1, end_tick + 1):

@@ -66,7 +66,7 @@ class Commits:
         return b"" if last is None else last[0], self._chains[self.next_tick - 1]
 
     def forget(self, tick: int) -> None:
-        """Drop the commit of a tick that is not needed any longer."""
+        """Drop the commit of a tick, once nothing needs it any longer."""
         self._frames.pop(tick, None)
         self._chains.pop(tick, None)
 

@@ -1,7 +1,7 @@
 """Which players exist: a function of the frame, as which entities are in it.
 
-A player exists while one of the robots is present that it commands; one that commands none, while the robot is that it
-is on; one that is on none, while one of those is that it hears as its own. Without any of these it always exists.
+A player exists while one of the robots that it commands is present; without such robots, while the robot is present
+that carries it; without one, while a robot is present that it hears as its own. Without any of these it always exists.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ def robots_it_lives_by(deployment: Deployment, player: Player) -> tuple[str, ...
 
 
 class Existence:
-    """The players of a deployment, as of the newest frame: `turn_to` writes `since` and `absent` of those that take
-    part."""
+    """The players of a deployment, as of the newest frame: `turn_to` writes `since` and `absent` of members."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._robots = {name: sorted(player.robots) for name, player in deployment.players.items()}

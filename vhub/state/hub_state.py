@@ -109,10 +109,10 @@ class HubState:
         edits: Sequence[Edit] = (),
         counts: Sequence[int] | None = None,
     ) -> dict[str, list[Flight]]:
-        """Phase one of closing the frame's tick; `packets` are in (robot, index) order, `edits` those of the frame.
+        """Phase one of closing the frame's tick; `packets` are in (robot, index) order, `edits` the frame's edits.
 
-        `counts` are the packets' counts within their channels, None where `packets` are all that robots sent: then they
-        follow from these. Append the packets whose fate is final to `fates` and return what is released, by client.
+        `counts` are the packets' counts within their channels, None where `packets` are all packets of the robots: then
+        they follow from these. Append packets with a final fate to `fates` and return the released ones, by client.
         """
         tick = frame.tick
         assert tick == self.closed + 1, (tick, self.closed)
@@ -211,7 +211,7 @@ class HubState:
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
         self.was_final = tick < self.final
         if self.was_final:
-            assert not any(member.is_due(tick) for member in self.members.values()), f"tick {tick} asks a client"
+            assert not any(member.is_due(tick) for member in self.members.values()), f"a client is due at tick {tick}"
             assert not deliveries, f"deliveries {tick + 1} were final without packets"
             return Deliveries(tick + 1, [])
         following = self._following(tick)
@@ -247,8 +247,8 @@ class HubState:
     def _following(self, tick: int) -> int:
         """Return for how many ticks after the next one no packet can reach a robot.
 
-        That is where nothing arrives that is in flight, and nothing is sent before: no sensor is due, no outbox is
-        filled, no lockstep client is due, or may be by what is in flight, none may join, and no other client is here.
+        Nothing in flight arrives, and nothing is sent before: no sensor is due, no outbox is
+        filled, no lockstep client is due, or may be by packets in flight, none may join, and no other client is here.
         Samples besides a sensor's rate go to clients, which act when they are due.
         """
         if not self._here.is_complete:
@@ -359,10 +359,10 @@ class HubState:
                 on_links.setdefault(link, []).append(flight)
             else:
                 self._put(flight, flight.arrival_tick)
-        for link, those in on_links.items():
-            due_ns = [flight.due_ns for flight in those]
-            link.retime(those, now_ns)
-            for flight, before_ns in zip(those, due_ns, strict=True):
+        for link, flights in on_links.items():
+            due_ns = [flight.due_ns for flight in flights]
+            link.retime(flights, now_ns)
+            for flight, before_ns in zip(flights, due_ns, strict=True):
                 # The deliveries to robots of this tick are published already.
                 earliest = tick + (flight.destination in self._robots)
                 self._let_fly(flight, flight.arrival_tick if flight.due_ns == before_ns else earliest)
@@ -374,7 +374,7 @@ class HubState:
         self._put(flight, arrival if member is None else member.release_tick(arrival))
 
     def _put(self, flight: Flight, arrival: int) -> None:
-        """Add a packet to those that arrive at a tick."""
+        """Add a packet to the arrivals of a tick."""
         flight.arrival_tick = arrival
         flights = self._flights.get(arrival)
         if flights is None:
@@ -487,7 +487,7 @@ class HubState:
                 "links": [[*key, fabric.states[key]] for key in sorted(fabric.states)],
                 "radios": [[*key, fabric.radios[key]] for key in sorted(fabric.radios)],
                 "airs": [[name, fabric.airs[name].state] for name in sorted(fabric.airs)],
-                "asked": fabric.asked,
+                "requested": fabric.requested,
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
                 "ages": self.ages.state(),
@@ -506,7 +506,7 @@ class HubState:
         for name, written in content.members:
             state.members[name] = Member(written)
         state._here.renew(state.members)
-        state.fabric.restore(content.links, content.radios, content.airs, content.asked)
+        state.fabric.restore(content.links, content.radios, content.airs, content.requested)
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final
         state.ages.restore(content.ages)

@@ -23,7 +23,7 @@ def may_restart(deployment: Deployment, name: str) -> bool:
 
 
 class Member:
-    """One client. In lockstep its ticks are those that leave the remainder `offset` by `period`; with `arrivals` those
+    """One client. In lockstep it acts at ticks that leave the remainder `offset` by `period`; with `arrivals` at ticks
     at which a packet of such an (endpoint, channel) reaches it, or at which it has not been called for a period.
     """
 
@@ -72,7 +72,7 @@ class Member:
         return self.active and self.since >= 0 and self.period > 0 and tick % self.period == self.offset
 
     def may_be_due(self, tick: int, closed: int) -> bool:
-        """Whether it may be due at a tick after those that are closed, regardless of arrivals: in each of the frames
+        """Whether it may be due at a tick after the closed ones, regardless of arrivals: in each of the frames
         between it may exist again."""
         if self.arrivals:
             return self._is_over(tick, self.since if self.exists else closed + 1)

@@ -2,7 +2,7 @@
 
 A fold of the records through the same state gives frames, fates, packets in flight and the next deliveries again, byte
 for byte. The first record of a file is a checkpoint of the whole state, so that older files can be removed; checkpoints
-also stand between ticks now and then, so that a fold need not begin far back. Further records are the epochs, the joins
+are also between ticks now and then, so that a fold need not begin far back. Further records are the epochs, the joins
 and leaves of a tick (its Go is sent before its record is written), and which players are away.
 """
 
@@ -192,8 +192,8 @@ class Folded:
 class Fold:
     """Computes the closings of a journal again from its records, the first of which is a head.
 
-    Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then those after
-    it. Raises Malformed when the records are not those of one run of this version.
+    Iterating gives each closing; `state`, `layout`, `commit`, `epoch`, `inputs` and `absences` are then the ones after
+    it. Raises Malformed unless the records are of one run of this version.
     """
 
     def __init__(self, deployment: Deployment, records: Iterable[bytes]) -> None:
@@ -258,7 +258,7 @@ class Fold:
 def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
     """Yield the state and the closing after every tick record; the first record is a head.
 
-    Raises Malformed when the records are not those of one run of this version.
+    Raises Malformed unless the records are of one run of this version.
     """
     for folded in Fold(deployment, records):
         yield folded.state, folded.closing

@@ -1,6 +1,6 @@
 """Restores a restarted vHub from the journal of the process before it.
 
-A fold of the journal gives the state after the last closed tick. On the way it gives what others may still ask for
+A fold of the journal gives the state after the last closed tick. On the way it gives what others may still request
 (deliveries, numbered downlinks) and what the capture lacks. Pure: the shell reads the journal and knows how far the
 capture is.
 """
@@ -81,7 +81,7 @@ class Past:
 def recall(
     deployment: Deployment, run: str, records: Sequence[bytes], captured: Captured | None, kept_ns: int
 ) -> Past | None:
-    """Return what the records of a journal say; None when they are of no run or hold nothing.
+    """Return the past that a journal records; None without any tick.
 
     `captured` is how far the capture is, None when there is none; downlinks of the last `kept_ns` of simulated time
     are kept to be sent again. Raises Malformed for the journal of another run, and for one that contradicts itself.

@@ -1,4 +1,4 @@
-"""The order in which the packets of clients at one tick are judged: those to robots first, since nodes wait for them.
+"""The order in which the packets of clients at one tick are judged: to robots first, since nodes wait for these.
 
 The costly verdicts of a broadcast by radio to clients are computed while the nodes solve. No verdict changes by that: a
 packet is judged first only on a link that shares nothing with any other (`Link.is_apart`), and where a link to a robot
