@@ -235,7 +235,7 @@ def test_every_form_is_in_a_world_of_all_or_has_its_laws_tested_alone() -> None:
     used: set[tuple[str, str]] = set()
     for name in WHOLE:
         used |= {(form.type_name, form.name) for form in forms_of(loaded(name))}
-    assert set(own()) - used == ALONE
+    assert set(own()) - used == {*ALONE}
 
 
 @pytest.mark.parametrize("name", WHOLE)
