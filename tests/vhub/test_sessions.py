@@ -26,7 +26,6 @@ from foosim.protocol.messages import (
     Down,
     End,
     Epoch,
-    Heartbeat,
     Join,
     Ready,
     Samples,
@@ -194,22 +193,6 @@ def test_no_other_client_can_make_the_run_wait_for_it(period: int) -> None:
 # --- lockstep --------------------------------------------------------------------------------------------------------
 
 
-def test_go_follows_commit_and_samples_and_the_tick_waits_for_all_dones() -> None:
-    hub = Hub().begin()
-    hub.said()
-    frame = FRAME
-    hub.say(channels.COMMIT, "vhub", Commit(1, 0, frame.digest, frame.values.tobytes(), [], [], False))
-    assert not hub.said(channels.DOWN) and hub.core.waiting_for.startswith("samples of ")
-    hub.say(channels.SAMPLES, "n1", Samples(0, frame.digest, "n1", [r.name for r in frame.layout.robots], []))
-    assert [(go.number, go.tick) for go in hub.said(channels.DOWN)] == [(1, 0), (1, 0)]
-    assert hub.core.waiting_for == "Done of hand, knee" and hub.state.closed == -1
-    hub.done("knee", 0)
-    assert not hub.said(channels.DELIVERIES) and hub.core.waiting_for == "Done of hand"
-    hub.done("hand", 0, sent(1))
-    (deliveries,) = hub.said(channels.DELIVERIES)
-    assert deliveries.tick == 1 and [packet.source for packet in deliveries.packets] == ["hand"]
-
-
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -231,17 +214,6 @@ def test_what_is_no_answer_to_this_go_is_not_taken(wrong: Done | Up) -> None:
     hub.done("hand", 0)
     (deliveries,) = hub.said(channels.DELIVERIES)
     assert deliveries.packets == [], "nothing of it counts"
-
-
-def test_a_done_that_is_said_again_counts_once() -> None:
-    hub = Hub().begin()
-    hub.commit(0)
-    hub.said()
-    hub.done("hand", 0, sent(1))
-    hub.done("hand", 0, sent(1), sent(2))
-    hub.done("knee", 0)
-    (deliveries,) = hub.said(channels.DELIVERIES)
-    assert [packet.sequence for packet in deliveries.packets] == [1] and hub.core.statistics().repeated == 1
 
 
 def test_a_go_is_said_again_with_doubling_waits_until_it_is_answered() -> None:
@@ -290,24 +262,6 @@ def test_no_deadline_passes_while_the_run_is_paused() -> None:
     assert hub.core.lost == ""
     hub.core.wake(102_000 * MS)
     assert hub.core.lost.startswith("hand has not answered tick 0 for 2 s")
-
-
-def test_a_lockstep_client_that_goes_is_lost_and_nothing_breaks() -> None:
-    for tick_waits, back_ms in ((True, 10_000), (False, 2_000)):  # of its two deadlines the longer one
-        hub = Hub().begin()
-        if tick_waits:
-            hub.commit(0)
-            hub.done("knee", 0)
-        else:
-            hub.close(0)
-        hub.core.client_gone("hand", 0)
-        hub.core.wake((back_ms - 1) * MS)
-        assert not any(beat.lost for beat in hub.said(channels.HEARTBEAT)), "it may come back"
-        hub.core.wake(back_ms * MS)
-        beat = hub.said(channels.HEARTBEAT)[-1]
-        assert isinstance(beat, Heartbeat) and beat.lost == "lost hand: its connection closed"
-        hub.core.wake(15_000 * MS)
-        assert hub.core.deadline_ns() > 15_000 * MS
 
 
 # --- free-running ----------------------------------------------------------------------------------------------------
