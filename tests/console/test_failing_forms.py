@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from importlib import import_module, invalidate_caches
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +18,7 @@ from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import FAILED, mark_kinds
 from foosim.world.frame import Frame
 from tests.console.memory import TABLE
+from tests.own_forms import folder_on_path
 
 FORMS: Final = """
 import sys
@@ -90,8 +91,7 @@ RAY: Final = [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
 @pytest.fixture
 def forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     (tmp_path / "shown_forms.py").write_text(FORMS)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    invalidate_caches()
+    folder_on_path(tmp_path, monkeypatch)
     module = import_module("shown_forms")
     yield module
     sys.modules.pop("shown_forms")
@@ -138,12 +138,6 @@ def test_rays_that_fail_are_named_once_and_the_others_drawn(forms: Any, act: Act
     assert ".py:" in note["text"]
     (content,) = drawing.overlays(frame, {"rays"})
     assert content["rays"] == [RAY]
-
-
-def test_rays_of_none_that_fails_are_all_drawn(forms: Any) -> None:
-    frame = initial_frame(deployment())
-    (content,) = Drawing(deployment()).overlays(frame, {"rays"})
-    assert content["rays"] == [RAY, RAY]
 
 
 def marks(tick: int, events: WorldEvents, frame: Frame) -> list[Mark]:

@@ -190,7 +190,7 @@ def test_settings_beyond_their_limits_are_refused_at_their_place(whole: str) -> 
 
 
 def is_told(place: Place, lines: Sequence[str]) -> bool:
-    """Return whether a line is about a place; of what is there several times, of any; of an unknown key, where it is."""
+    """Return whether a line is about a place: of an unknown key, about the section that it is in."""
     *names, last = (rf"\[{key}\]" if isinstance(key, int) else f".{re.escape(key)}" for key in place)
     names += ["" if last == ".unheard_of" else last]
     names[1:2] = [rf"{name}(-\d+)?" for name in names[1:2]]

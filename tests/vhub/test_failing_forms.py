@@ -6,13 +6,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from importlib import import_module, invalidate_caches
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
 from foosim.simulation.run import rehearse
+from tests.own_forms import folder_on_path
 
 FORMS: Final = """
 import sys
@@ -114,8 +115,7 @@ SAID: Final = "model hub_post of beta failed at tick 0: {} (hub_forms.py:"
 @pytest.fixture
 def forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     (tmp_path / "hub_forms.py").write_text(FORMS)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    invalidate_caches()
+    folder_on_path(tmp_path, monkeypatch)
     yield import_module("hub_forms")
     sys.modules.pop("hub_forms")
 

@@ -313,21 +313,6 @@ def test_a_full_inbox_refuses_and_counts() -> None:
     assert hub.state.refusals == {"inbox_full": 40_000} and hub.state.packets.offered == 40_000
 
 
-def test_what_a_client_sent_before_it_went_is_still_judged() -> None:
-    hub = Hub().begin()
-    hub.enter("ear", wanted=["red.goal"])
-    hub.close(0)
-    hub.said()
-    hub.say(channels.UP, "ear", Up("ear", "one", [sent(1), sent(2)]))
-    hub.core.client_gone("ear", 0)
-    hub.enter("ear", boot="two")
-    hub.say(channels.UP, "ear", Up("ear", "two", [sent(2), sent(3)]))
-    hub.close(1)
-    (deliveries,) = hub.said(channels.DELIVERIES)
-    assert [packet.sequence for packet in deliveries.packets] == [1, 2, 3]
-    assert hub.state.refusals == {"duplicate": 1} and hub.state.members["ear"].active
-
-
 @pytest.mark.parametrize("comes_back", [False, True])
 def test_what_is_sent_before_the_join_is_taken_is_judged_with_it(comes_back: bool) -> None:
     """The join and the packets come while tick 5 waits for a Done: the join is taken at tick 6."""
@@ -368,30 +353,6 @@ def test_what_is_sent_without_ever_joining_is_refused() -> None:
     hub.done("hand", 0)
     hub.done("knee", 0)
     assert hub.state.closed == 0 and hub.state.refusals == {"unknown_source": 2}
-
-
-def presence(hub: Hub) -> tuple[bool, int]:
-    """Whether `ear` takes part, and how many channels it hears."""
-    member = hub.state.members["ear"]
-    return member.active, len(member.subscriptions)
-
-
-def test_a_client_that_leaves_hears_nothing_more_and_may_come_back() -> None:
-    hub = Hub().begin()
-    hub.enter("ear", wanted=["red.goal"])
-    hub.close(0)
-    hub.core.client_gone("ear", 0)
-    assert presence(hub) == (True, 1)
-    hub.close(1)
-    assert presence(hub) == (False, 0)
-    hub.said()
-    hub.enter("ear", boot="two", wanted=["red.goal"])
-    (welcome,) = hub.said(channels.CLIENT_WELCOME)
-    assert welcome.boot == "two"
-    for tick in range(2, hub.state.final + 1):
-        assert presence(hub) == (False, 0), "the deliveries behind this tick are final"
-        hub.close(tick)
-    assert presence(hub) == (True, 1) and hub.state.members["ear"].joined_tick == hub.state.closed
 
 
 def test_the_end_is_said_to_everyone_with_the_next_number() -> None:
