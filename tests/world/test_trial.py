@@ -364,9 +364,14 @@ def test_an_interrupt_is_no_misdeed(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         rehearse(own_world().text(), NAME, 30, 1)
 
 
-@pytest.mark.parametrize("made", ["np.zeros((2, 1))", "[[1.0, 2.0]] * 2"])
+ARRAY: Final = "expected an array of float64 of the shape (2, 2)"
+
+
+@pytest.mark.parametrize(
+    ("made", "said"), [("np.zeros((2, 1))", ARRAY), ("[[1.0, 2.0]] * 2", ARRAY), ("exit(0)", "SystemExit: 0")]
+)
 def test_sensors_that_measure_together_give_an_array(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: str, said: str
 ) -> None:
     together = f"""
 class Batch:
@@ -377,7 +382,6 @@ class Batch:
 Places.together = staticmethod(lambda sensors: Batch())
 """
     lines = refused(tmp_path, monkeypatch, f"import numpy as np\n{GOOD}{together}")
-    said = "expected an array of float64 of the shape (2, 2)"
     assert any(said in line and "sensor places of" in line for line in lines), lines
 
 
