@@ -45,7 +45,7 @@ up: environment
 	@.venv/bin/foosim up deploy/table.yaml $(if $(filter --detach,$(ARGS)),,--console) $(ARGS)
 
 play: environment
-	@$(PYTEST) -m campaign tests/simulation/test_a_minute_of_play.py tests/simulation/test_one_world.py tests/library/test_matches.py tests/laws $(ARGS)
+	@$(PYTEST) -m campaign tests/simulation/test_a_minute_of_play.py tests/library/test_matches.py tests/laws $(ARGS)
 
 minutes: environment
 	@$(PYTEST) -o timeout=0 -m campaign tests/simulation/test_swarm.py $(ARGS)

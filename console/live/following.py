@@ -89,9 +89,7 @@ class Following:
             deployment = deployment.with_assets(files(deployment))
         world = World(deployment)
         if world.drawing.layout.digest.hex() != what["layout"]:
-            raise Malformed(
-                f"run {what['run']} has another layout: another version of foosim runs it"
-            )
+            raise Malformed(f"run {what['run']} has another layout: another version of foosim runs it")
         return world
 
     def turn_to(self, what: Mapping[str, Any], world: World) -> bool:

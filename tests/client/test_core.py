@@ -231,30 +231,6 @@ def test_a_welcome_with_a_deployment_that_is_not_valid_is_a_refusal() -> None:
 # --- lockstep --------------------------------------------------------------------------------------------------------
 
 
-def test_the_run_waits_for_the_answer_at_each_tick_of_the_period() -> None:
-    air = Air()
-    core = air.enter("hand", 2)
-    air.start()
-    for tick in range(8):
-        air.close()
-        air.carry(core)
-        if tick % 2:
-            assert (core.go, air.closed()) == (None, tick)
-            continue
-        assert core.go is not None and core.go.tick == core.tick == tick
-        assert air.closed() == tick - 1, "the hub waits"
-        assert [packet.payload for packet in core.go.packets] == [
-            b"%16d" % at for at in (tick - 1, tick) if at in (0, 5)
-        ]
-        core.done([Packet("red.goal", "echo", b"%d" % tick)])
-        air.carry(core)
-        assert air.closed() == tick
-    delivered = [(d.tick, p.sequence, p.payload) for d in air.deliveries for p in d.packets]
-    assert delivered == [(1, 1, b"0"), (3, 2, b"2"), (5, 3, b"4"), (7, 4, b"6")]
-    assert (core.statistics().answered, core.statistics().sent, core.statistics().received) == (4, 4, 2)
-    assert core.statistics().missing == core.statistics().malformed == 0
-
-
 def test_a_lost_go_and_a_lost_answer_come_again_byte_for_byte() -> None:
     air = Air()
     core = air.enter("hand", 1)
@@ -334,26 +310,6 @@ def test_many_packets_go_in_as_many_messages_as_they_need() -> None:
     messages = [decode_any(Join | Up | Done, message.payload) for message in published(core)]
     assert len(messages) == 3
     assert [p.sequence for m in messages if isinstance(m, Up) for p in m.packets] == list(range(1, 71))
-
-
-def test_numbers_go_on_when_a_client_comes_back() -> None:
-    air = Air()
-    first = air.enter("ear", 0)
-    air.start()
-    first.send([ECHO, ECHO, ECHO])
-    air.carry(first)
-    air.close()
-    air.hub.client_gone("ear", air.now_ns)
-    air.close()
-    second = air.enter("ear", 0, "two")
-    second.send([ECHO])
-    (up,) = published(second)
-    message = decode_any(Join | Up | Done, up.payload)
-    assert isinstance(message, Up) and [packet.sequence for packet in message.packets] == [4]
-    air.tell(up.channel, up.name, up.payload)
-    air.close()
-    air.said()
-    assert [len(deliveries.packets) for deliveries in air.deliveries] == [0, 3, 0, 1]
 
 
 def test_the_end_is_heard_and_nothing_after_it() -> None:

@@ -249,22 +249,6 @@ def test_what_waits_to_be_recorded_is_bounded(monkeypatch: pytest.MonkeyPatch) -
     assert ear.statistics().sent == 6, "there is room again"
 
 
-def test_what_is_recorded_is_told_to_a_client_that_hears_nothing() -> None:
-    air = Storm()
-    air.start()
-    ear = ClientCore("ear", "one", air.now_ns)
-    air.carry(ear)
-    ear.join(0, [])
-    air.carry(ear)
-    air.close()
-    ear.send(packets_of(1))
-    air.carry(ear)
-    air.close()
-    assert len(ear._unrecorded) == 2
-    air.settle(ear)
-    assert len(ear._unrecorded) == 0 and ear.statistics().downlinks == 0
-
-
 def test_the_end_of_a_run_is_heard_whatever_its_number() -> None:
     """A vHub that has lost the end of its journal goes on counting downlinks from before those that were sent."""
     air = Storm()

@@ -140,12 +140,6 @@ def test_rays_that_fail_are_named_once_and_the_others_drawn(forms: Any, act: Act
     assert content["rays"] == [RAY]
 
 
-def test_rays_of_none_that_fails_are_all_drawn(forms: Any) -> None:
-    frame = initial_frame(deployment())
-    (content,) = Drawing(deployment()).overlays(frame, {"rays"})
-    assert content["rays"] == [RAY, RAY]
-
-
 def marks(tick: int, events: WorldEvents, frame: Frame) -> list[Mark]:
     return events.take(Frame(tick, frame.layout, np.array(frame.values)))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from foosim.console.live.following import Following, first_frame, readable
+from foosim.console.live.following import Following, first_frame
 from foosim.console.shown.overlays import Overlays
 from foosim.console.shown.source import About, Moment, Wanted
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -20,7 +20,7 @@ from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.forms.forms import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
-from tests.console.memory import TABLE, table, table_with_spares
+from tests.console.memory import TABLE, table_with_spares
 
 
 def commit(frame: Frame) -> bytes:
@@ -61,14 +61,6 @@ def show(found: Following, frame: Frame) -> Moment:
     return moment
 
 
-def test_a_frame_of_another_world_is_not_drawn() -> None:
-    found = following()
-    layout = build_layout(table())
-    assert found.show(commit(Frame(7, layout, np.zeros(layout.size)))) is None
-    assert found.show(b"no commit") is None
-    assert show(found, frame_of(8)).tick == 8
-
-
 def test_a_ball_comes_and_goes_in_one_scene() -> None:
     found = following()
     names = [link["name"] for link in found.content()["links"]]
@@ -86,11 +78,6 @@ def test_the_same_world_described_again_is_no_new_scene() -> None:
     first = found.first_moment(first_frame(world.drawing, what))
     assert first is not None and (first.tick, first.jump) == (9, True)
     assert found.first_moment(first_frame(world.drawing, what)) is None
-
-
-def test_time_that_goes_back_is_a_jump() -> None:
-    found = following()
-    assert [show(found, frame_of(tick)).jump for tick in (6, 7, 3, 4)] == [False, False, True, False]
 
 
 def status(state: str, *requests: dict[str, Any]) -> dict[str, Any]:
@@ -153,17 +140,6 @@ def test_a_link_that_is_watched_is_told_with_its_rule_before_it_drops_anything()
     assert found.explained(watched, wanted) == []
 
 
-def test_contacts_are_where_balls_touch_something() -> None:
-    layout = build_layout(table())
-    values = np.zeros(layout.size)
-    ball = layout["ball"].offsets
-    values[ball["position"] : ball["position"] + 3] = 1.0, 2.0, 3.0
-    values[ball["contacts"] : ball["contacts"] + 2] = 2.0, 0.5
-    content = Overlays(table(), layout).content(Frame(7, layout, values), {"contacts"})
-    assert content["contacts"] == [(1.0, 2.0, 3.0, 0.5)]
-    assert content["rays"] == []
-
-
 def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None:
     sets = ("robots.rover01.heading=90 deg", "robots.rover02.spare=true")
     deployment = load_deployment(fleet_text(2, *sets), "hall")
@@ -179,9 +155,3 @@ def test_rays_end_where_they_meet_a_wall(fleet_text: Callable[..., str]) -> None
     assert ways.max() <= sensor.range + 1e-3
     heading = frame.at("rover01", "heading")
     np.testing.assert_allclose(np.arctan2(rays[0, 1], rays[0, 0]), heading, atol=1e-3)
-
-
-def test_an_operator_is_shown_by_a_readable_name() -> None:
-    assert readable("operator-4711-0a1b2c3") == "operator (process 4711)"
-    assert readable("operator.alice.0a1b2c3") == "operator.alice"
-    assert readable("tester") == "tester"

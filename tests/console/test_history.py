@@ -16,7 +16,7 @@ from foosim.capture.reader import open_capture
 from foosim.capture.rows import CLIENTS, PACKETS, TICK, EditRow, EpochRow, OwnerRow, RecoveryRow
 from foosim.console.recorded.capture_curves import curve_points, reading_points
 from foosim.console.recorded.capture_history import CaptureHistory
-from foosim.console.recorded.link_history import PACKET_MARKS, LinkHistory, PacketMark
+from foosim.console.recorded.link_history import LinkHistory, PacketMark
 from foosim.console.recorded.recording import Recording
 from foosim.console.shown.source import Curve
 from foosim.console.shown.timeline import MARKS_MAX, Mark, Timeline, WorldEvents, edit_text
@@ -165,15 +165,6 @@ def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment)
     assert len(timeline.news()) == MARKS_MAX - 1, "bounded"
 
 
-def test_drops_of_a_long_run_are_counted_in_spans_that_get_longer(table: Deployment) -> None:
-    timeline = Timeline(table)
-    hours = 20_000
-    for second in range(hours):
-        timeline.take_drop(second * SECOND_NS, "snr")
-    marks = timeline.news()
-    assert len(marks) <= 121 and sum(int(mark.text.split()[0]) for mark in marks) == hours
-
-
 def test_a_run_has_its_marks(history: CaptureHistory, table: Deployment) -> None:
     recording = history.recording
     rows = [recording.row(TICK, number) for number in range(TICKS + 1)]
@@ -256,15 +247,6 @@ def test_the_last_drops_of_a_link_are_explained_as_the_command_does(history: Cap
     assert history.watched("nobody", "nobody", 0) == {"link": ["nobody", "nobody"], "rule": "", "drops": []}
 
 
-def test_of_many_links_the_first_are_counted(history: CaptureHistory, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("foosim.console.recorded.link_history.LINKS_MAX", 3)
-    few = opened(history.recording.path).links
-    windows = history.links.windows(SECOND_NS, 2 * SECOND_NS)
-    kept = few.windows(SECOND_NS, 2 * SECOND_NS)
-    assert len(kept) == 3 and all(window in windows for window in kept)
-    assert few.totals(SECOND_NS)["offered"] == sum(window["offered"] for window in kept)
-
-
 # --- curves ----------------------------------------------------------------------------------------------------------
 
 
@@ -290,13 +272,3 @@ def test_curves_of_a_run_are_what_the_capture_has(history: CaptureHistory) -> No
         (tick, numbers[2]) for tick, numbers in readings
     ]
     assert curve_points(history, Curve("f", reading=("camera", "nothing")), TICKS) == []
-
-
-def test_the_marks_of_packets_are_a_part_of_their_rows(run: Path) -> None:
-    recording = Recording(run, (PACKETS,))
-    for number in range(0, len(recording.index.places[PACKETS]), 50):
-        row, mark = (
-            recording.row(PACKETS, number),
-            recording.decoded(PACKET_MARKS, recording.index.read(PACKETS, number)),
-        )
-        assert all(getattr(row, name) == getattr(mark, name) for name in mark.__struct_fields__)

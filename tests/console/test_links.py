@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from foosim.console.recorded.link_history import LinkHistory, PacketMark
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Count, Links, Windows
@@ -77,13 +75,6 @@ def test_what_was_counted_while_nobody_looked_is_in_no_window() -> None:
     assert windows.take(92.0, {KEY: count(920, 90, snr=90)})[KEY] == count(20, 0) and windows.length_s == 2.0
 
 
-def test_a_link_that_counts_anew_and_time_that_goes_back_begin_a_window() -> None:
-    windows = Windows(5.0)
-    windows.take(1.0, {KEY: count(10, 0)})
-    assert windows.take(2.0, {KEY: count(3, 0)})[KEY] == count(3, 0)
-    assert windows.take(0.5, {KEY: count(12, 1, snr=1)})[KEY] == count(12, 1, snr=1)
-
-
 def test_a_link_that_was_not_told_before_begins_with_its_first_count() -> None:
     """Of many links the busiest are told: one that comes among them has not done all in this window."""
     windows, other = Windows(5.0), ("b", "c", "rule")
@@ -142,14 +133,3 @@ def test_radio_links_have_ends_and_the_walls_that_they_cross(fleet_text: Callabl
         ("queue_full", "sender", 1),
     }
     assert links.message({**status(100, row), "links_in_all": 300})["drops"] == [], "told already"
-
-
-def test_nothing_stands_between_the_ends_of_a_link_of_which_one_is_absent(fleet_text: Callable[..., str]) -> None:
-    deployment = load_deployment(fleet_text(2, "robots.rover02.spare=true"), "hall")
-    drawing, frame = Drawing(deployment), initial_frame(deployment)
-    links = Links(deployment, drawing.entities)
-    links.move(frame)
-    row = ["pilot01", "pilot02", 10, 0, 10, 0, "fleet/wifi", 0, {"rx_down": 10}, []]
-    (line,) = links.message(status(100, row))["links"]
-    assert (line["radio"], line["walls"]) == (True, [])
-    assert np.isnan(drawing.moment(frame).poses[line["to_link"]]).all(), "its end is not drawn"

@@ -79,23 +79,3 @@ def test_what_is_kept_is_bounded_and_reaches_as_far_back_in_a_large_world(count:
     assert sum(row[2].nbytes + kept.ROW_BYTES for row in rows._rows) <= 1.01 * kept.FRAMES_BYTES
     points = rows.reader(lambda what: 0)()
     assert points[-1][0] == last and (last - points[0][0]) * TICK_NS > 0.9 * kept.WINDOW_NS
-
-
-def test_readings_that_come_after_nobody_plots_them_are_none_and_leave_a_hole() -> None:
-    history = History(TICK_NS)
-    plotted = Wanted(1, 50.0, readings=(("camera", "ball"),))
-    for number, wanted in enumerate((plotted, Wanted(1, 50.0), Wanted(), plotted), start=1):
-        history.listen(wanted)
-        said = {"type": "readings", "robot": "camera", "channel": "ball", "points": [[number * WIDE, [1.0]]]}
-        history.keep(said)
-    points = history.reader(Curve("x", reading=("camera", "ball")))()
-    assert [(tick, isnan(value)) for tick, value in points] == [(WIDE, False), (WIDE + 1, True), (4 * WIDE, False)]
-
-
-def test_readings_of_the_channels_that_were_heard_last_are_kept() -> None:
-    history = History(TICK_NS)
-    history.listen(Wanted(1, 50.0, readings=tuple((f"r{number}", "c") for number in range(kept.READINGS_MAX + 1))))
-    for number in range(kept.READINGS_MAX + 1):
-        history.keep({"type": "readings", "robot": f"r{number}", "channel": "c", "points": [[5, [1.0]]]})
-    known = [bool(history.reader(Curve("x", reading=(f"r{number}", "c")))()) for number in (0, 1)]
-    assert known == [False, True]

@@ -7,6 +7,7 @@ import pytest
 
 from foosim.console.shown.drawing import Drawing, Poser
 from foosim.console.shown.scene_json import scene_content
+from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import initial_frame
@@ -16,16 +17,21 @@ from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from tests.console.memory import table, table_with_spares
-from tests.forms.worlds import SOLIDS
+from tests.whole_worlds import assets, yard
 
 
-@pytest.mark.parametrize("world", ["table", "hall", "solids"])
+def yard_with_files() -> Deployment:
+    text, files = pin_assets(yard(), "yard.yaml", assets())
+    return load_deployment(text, "yard.yaml").with_assets(files)
+
+
+@pytest.mark.parametrize("world", ["table", "hall", "yard"])
 def test_poses_are_those_of_forward_kinematics(world: str, fleet_text: Callable[..., str]) -> None:
     """Of two balls, of a hall, of bodies whose centre of mass is beside their origin."""
     made: dict[str, Callable[[], Deployment]] = {
         "table": table_with_spares,
         "hall": lambda: load_deployment(fleet_text(4), "hall"),
-        "solids": lambda: load_deployment(SOLIDS.text(), "solids.yaml"),
+        "yard": yard_with_files,
     }
     deployment = made[world]()
     layout = build_layout(deployment)

@@ -111,17 +111,6 @@ def test_a_capture_that_grows_is_looked_at_from_where_the_last_look_ended(run: P
     assert [recording.index.places[topic] for topic in TOPICS] == [other.index.places[topic] for topic in TOPICS]
 
 
-def test_a_file_that_became_shorter_begins_anew(run: Path, tmp_path: Path) -> None:
-    whole = run.read_bytes()
-    path = tmp_path / "run.mcap"
-    path.write_bytes(whole[: len(whole) * 9 // 10])
-    recording = Recording(path)
-    before, generation = recording.span[1], recording.index.generation
-    path.write_bytes(whole[: len(whole) // 2])
-    assert recording.refresh() and recording.index.generation == generation + 1
-    assert 0 < recording.span[1] < before and recording.look(recording.span[1]) is not None
-
-
 def test_a_chunk_without_indexes_is_looked_through(run: Path, tmp_path: Path) -> None:
     """Its writer was killed between the chunk and its indexes."""
     path = rewritten(run, tmp_path / "one.mcap", messages_of(run))

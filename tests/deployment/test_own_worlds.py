@@ -18,11 +18,8 @@ from foosim.common.names import NAME_RULE
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.simulation.run import rehearse
-from foosim.simulation.system import Settings
-from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
 from foosim.world.layout import build_layout
-from tests.frames import Frames
 from tests.kinematic_yard import yard_text
 from tests.own_forms import TABLE, folder_on_path, problems, written
 
@@ -111,15 +108,6 @@ def test_a_rigid_model_that_may_not_share_a_solve_is_refused(site: Path) -> None
     ]
 
 
-def test_a_rule_of_robots_that_nobody_solves_is_refused(site: Path) -> None:
-    written(site, *OF_ENTITY, "rule('fade', EntityRuleSettings)(Own)")
-    assert problems("robots.camera.rules={fade: {kind: 'own_form:Own'}}") == [
-        "robots.camera.rules.fade.kind: rule of entities that would never apply: a camera is neither rigid nor has a "
-        "motion, 'own_form:Own'"
-    ]
-    assert problems("robots.red.goal.rules={fade: {kind: 'own_form:Own'}}") == []
-
-
 @pytest.mark.parametrize(
     ("about", "told"),
     [
@@ -135,15 +123,6 @@ def test_a_rule_of_robots_reads_and_writes_fields_that_there_are(site: Path, abo
     written(site, *OF_ENTITY, f"rule('fade', EntityRuleSettings, {about})(Own)")
     expected = [f"robots.red.goal.rules.fade.kind: {told}, 'own_form:Own'"] if told else []
     assert problems("robots.red.goal.rules={fade: {kind: 'own_form:Own'}}") == expected
-
-
-def test_names_that_begin_with_a_vowel_have_their_article(site: Path) -> None:
-    written(site, "model('omni', RobotSettings)(Own)")
-    assert problems("robots.camera={model: 'own_form:Own', sensors: {own: {kind: encoder, rate: 100 Hz}}}",
-                    "players={}") == [
-        "robots.camera.sensors.own.kind: sensor that an omni cannot carry, for lack of joint_positions (valid on: "
-        "differential_drive with dynamics: rigid, rod), 'encoder'"
-    ]  # fmt: skip
 
 
 # --- rules of the world ----------------------------------------------------------------------------------------------
@@ -240,12 +219,6 @@ def test_models_of_a_kit_of_another_kit_need_it(site: Path) -> None:
     assert problems("zoo={}", text=WAREHOUSE) == [f"kit zoo: {told}, 'zoo'"]
 
 
-def test_the_forms_of_a_world_have_the_models_of_its_kits() -> None:
-    """What can be added, too: two nodes with other versions of them would compute other worlds."""
-    deployment = load_deployment(TEXT, TABLE.name)
-    assert ("model", "ball") in {(form.type_name, form.name) for form in forms_of(deployment)}
-
-
 FAILING: Final = {
     "    def __init__(self, section, spec): pass": "    def __init__(self, section): pass",
     "    def shapes(self): return ()": "    def shapes(self): return (1 // 0,)",
@@ -266,22 +239,7 @@ def test_a_kit_that_fails_is_named_with_the_place_in_its_file(site: Path, line: 
     assert "__init__" in told or re.search(r"\(own_form\.py:\d+\)", told), told
 
 
-def test_a_scene_that_fails_is_named_with_the_place_in_its_file(site: Path) -> None:
-    written(site, "def shapes(settings):", "    return [settings.height]", "scene('plain', SceneSettings)(shapes)")
-    (told,) = problems("scene={kind: 'own_form:shapes'}")
-    assert told.startswith(
-        "scene own_form:shapes failed at tick 0: AttributeError: 'SceneSettings' object has no attribute"
-    )
-
-
 # --- what a form of one world says of another ------------------------------------------------------------------------
-
-
-def test_keys_of_a_rod_are_those_of_rods_alone(site: Path) -> None:
-    own = ("class Team(RobotSettings):", "    team: str", "    line: str", "model('judge', Team)(Own)")
-    written(site, *own)
-    judge = "robots.camera={model: 'own_form:Own', team: red, line: %s}"
-    assert problems(judge % "goal", "players={}") == [] == problems(judge % "none", "players={}")
 
 
 def test_free_bodies_are_not_those_of_kits_alone(site: Path, fleet_text: Callable[..., str]) -> None:
@@ -291,26 +249,6 @@ def test_free_bodies_are_not_those_of_kits_alone(site: Path, fleet_text: Callabl
     surface = "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"
     assert surface in problems(*sets, text=fleet_text(1))
     assert surface not in problems(*sets, "robots.crate={model: 'own_form:Own'}", text=fleet_text(1))
-
-
-MANY: Final = """
-from foosim.world.scene import Body, Box, Link, Shape
-
-class Many(Own):
-    def __init__(self, settings, at):
-        self.name = at.robot.name
-    def body(self):
-        shapes = tuple(Shape(Box((0.1, 0.1, 0.1)), "default", (1.0,) * 4, (0.1 * n, 0.0, 1.0)) for n in range(40))
-        return Body(self.name, "many", (0.0, 0.0, 0.0), (Link("a", "fixed", shapes, 1.0, (0.1,) * 3),))
-    def place(self, view):
-        pass
-model("many", RobotSettings, is_rigid=True, slots=CONTACTS)(Many)
-"""
-
-
-def test_a_rigid_model_has_as_many_shapes_as_it_likes_and_no_check_of_its_own(site: Path) -> None:
-    written(site, "from foosim.world.forms.forms import CONTACTS", MANY)
-    assert problems(text=yard_text({"a": {"model": "own_form:Many"}}, engine="mujoco")) == []
 
 
 @pytest.mark.parametrize(
@@ -347,13 +285,6 @@ def test_objects_have_names_of_their_own() -> None:
         assert problems(*sets, text=text) == [what]
 
 
-def test_a_rod_by_its_class_is_a_rod() -> None:
-    rod = "{model: 'foosim.library.table.rod:Rod', team: red, line: goal}"
-    assert problems(f"robots.camera={rod}", "players={}") == [
-        "robots.camera.line: red's line is already the rod red.goal, 'goal'"
-    ]
-
-
 def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callable[..., str]) -> None:
     mast = (
         "class Mast(Own):",
@@ -383,32 +314,6 @@ def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callabl
 
 
 # --- sensors that speak ----------------------------------------------------------------------------------------------
-
-
-SPEAKS: Final = (
-    "class Touch(Own):",
-    "    def __init__(self, settings, at): self.contacts = at.slot('contacts')",
-    "    def sample(self, view): return Number(view.read(self.contacts)[1])",
-    "sensor('touch', SensorSettings, Number, needs=('contacts',), trigger='contacts')(Touch)",
-)
-
-
-def test_modifiers_of_a_sensor_that_speaks_have_room_for_a_value_at_each_tick(site: Path) -> None:
-    """It measures when the ball meets the rod, beside its rate of once a second."""
-    written(site, *SPEAKS)
-    rods = [name for name, robot in load_deployment(TEXT, TABLE.name).robots.items() if robot.model == "rod"]
-    modifiers = "[{kind: delay, time: 40 ms}, {kind: bias_walk, initial: 1 mm, walk: 1 mm}]"
-    sensors = [
-        f"robots.{rod}.sensors.own={{kind: 'own_form:Touch', rate: 1 Hz, modifiers: {modifiers}}}" for rod in rods
-    ]
-    fast = ("engine=pure", "players={}", "table.rules.kickoff_delay=20 ms", "table.rules.kickoff_speed=4 m/s")
-    text = apply_sets(TEXT, TABLE.name, [*fast, *sensors])
-    assert build_layout(load_deployment(text, TABLE.name))["red.goal"].counts["own.delay.ticks"] == 21
-    frames = Frames()
-    done = rehearse(text, TABLE.name, 400, 2, settings=Settings(on_commit=frames))
-    assert not done.json["failed"], done.json["reason"]
-    assert sum(frames.frames[-1].at(rod, "own.samples") for rod in rods) > len(rods), "the ball meets a rod"
-    assert done.digests == rehearse(text, TABLE.name, 400, 1).digests, "law 1"
 
 
 # --- scenery ---------------------------------------------------------------------------------------------------------

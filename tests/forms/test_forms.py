@@ -1,131 +1,225 @@
-"""Each of foosim's forms in a world of its own: its settings beyond their limits.
+"""Each of foosim's forms in the worlds of tests/whole_worlds.py: its settings beyond their limits.
 
-`make forms` has the long part: the laws, thousands of ticks by several seeds, and runs with settings at their limits.
-`make test` has the laws of all forms together, in the worlds of tests/whole_worlds.py, and of those alone that these
-cannot have.
+`make forms` has the long part: the laws over thousands of ticks by several seeds, and runs with settings at their
+limits. `make test` has the laws in tests/laws/test_one_world.py.
 """
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Final
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import pytest
+import yaml
 
+from foosim.cli.components import as_json
 from foosim.cli.rehearse import elsewhere
 from foosim.common.errors import DeploymentError
+from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.simulation.check.component_check import ComponentCheck
 from foosim.simulation.run import rehearse
-from foosim.simulation.system import Settings
-from foosim.world.assembly.used_forms import forms_of
 from foosim.world.forms import registry
+from foosim.world.forms.forms import ComponentType
 from foosim.world.forms.registry import FORMS
-from tests.forms.limits import Edge, edges
-from tests.forms.worlds import VARIANTS, WORLDS, World, changed_slots
-from tests.frames import Frames, broken_laws
+from tests.forms.worlds import DEPLOY, HALL, SCENE, TABLE, Place, World, scene
+from tests.frames import broken_laws
+from tests.whole_worlds import NAME, assets, mixed, written, yard
 
-Key = tuple[str, ...]
-TICKS: Final = 100
-NAME: Final = "world.yaml"
-OF_FILES: Final = [("model", "urdf"), *(("actuator", name) for name in ("joint_torque", "look_at", "pan_tilt"))]
-"""What only a robot from a file has, which a text alone does not bring: tests/whole_worlds.py has them."""
-ALL: Final[Mapping[Key, World]] = dict[Key, World]([*WORLDS.items(), *VARIANTS.items()])
-EACH: Final = pytest.mark.parametrize("key", ALL, ids="-".join)
-ALONE: Final = {("scene", "football_table"), ("scene", "hall")}
-"""What no world of tests/whole_worlds.py has: each has one engine and one scene."""
-EACH_ALONE: Final = pytest.mark.parametrize(
-    "key", [pytest.param(key, marks=() if key in ALONE else pytest.mark.campaign) for key in ALL], ids="-".join
-)
+Key = tuple[str, str]
+TICKS: Final = 60
+WHOLE: Final[Mapping[str, tuple[Any, Any]]] = {"mixed": (mixed, lambda: DEPLOY), "everything": (yard, assets)}
+EACH: Final = pytest.mark.parametrize("whole", WHOLE)
+ALONE: Final[Mapping[Key, World]] = {
+    ("scene", "football_table"): scene(HALL, "football_table", {key: TABLE.data["table"][key] for key in SCENE}),
+    ("scene", "hall"): scene(TABLE, "hall", {key: HALL.data["hall"][key] for key in ("length", "width", "walls")}),
+}
+"""Scenes that no world of tests/whole_worlds.py has, which have one each."""
+QUANTITY: Final = re.compile(r"[\w ]+, (-?[\d.e+-]+) (.+?) to (-?[\d.e+-]+) (.+?): a number and one of .*")
+NUMBER: Final = re.compile(r"(number|integer)(?:, at least ([\d.]+))?(?:, at most ([\d.]+))?")
+NOTHING: Final[tuple[Any, ...]] = ("nonsense", "1 furlong", [], True, "nan", "inf")
+"""Values that no setting with limits takes; each of these settings is given one of them."""
+
+
+TOGETHER: Final = 60
+"""Settings changed in one text: of more than 100 problems the rest is not told."""
+
+
+class Edge(NamedTuple):
+    """A value of a setting at its place in the deployment; whether it is within the limits."""
+
+    place: Place
+    value: Any
+    is_within: bool
 
 
 @cache
-def own() -> list[tuple[str, str]]:
+def own() -> list[Key]:
     found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
     return sorted((form.type_name, form.name) for form in found if form.is_own)
 
 
-def test_every_form_has_a_world_of_its_own() -> None:
-    assert sorted([*WORLDS, *OF_FILES]) == own()
-    for (form, name), world in WORLDS.items():
-        used = {(found.type_name, found.name) for found in forms_of(load_deployment(world.text(), NAME))}
-        assert (form, name) in used
-
-
 @cache
-def broken(text: str) -> list[str]:
-    """Return which laws a world breaks; several forms share one."""
-    return [str(law) for law in broken_laws(text, NAME, TICKS)]
+def parsed(whole: str) -> str:
+    return json.dumps(yaml.safe_load(WHOLE[whole][0]()))
 
 
-@cache
-def changed(text: str) -> set[str]:
-    """Return which slots of a world change."""
-    frames = Frames()
-    rehearse(text, NAME, TICKS, 1, settings=Settings(on_commit=frames))
-    return changed_slots(frames.frames[0], frames.frames[-1])
+def data_of(whole: str) -> dict[str, Any]:
+    data: dict[str, Any] = json.loads(parsed(whole))
+    return data
 
 
-@EACH_ALONE
-def test_it_obeys_the_laws(key: Key) -> None:
-    assert broken(ALL[key].text()) == []
+def folder_of(whole: str) -> Path:
+    folder: Path = WHOLE[whole][1]()
+    return folder
 
 
-@EACH_ALONE
-def test_its_world_moves(key: Key) -> None:
-    """A world in which nothing happens would prove nothing: robots go where they are told, sensors measure."""
-    moved = changed(ALL[key].text())
-    assert any(slot.endswith(("joint_positions", "wheel_travel", "angular_velocity")) for slot in moved)
-    if key[0] == "sensor" or key[0] == "modifier":
-        assert any(slot.endswith("own.samples") for slot in moved)
+def places(data: Mapping[str, Any]) -> Iterator[tuple[Key, Place]]:
+    """Yield each component that a deployment names, with the place of its settings."""
+    for kit in ("table", "hall"):
+        if kit in data:
+            yield ("kit", kit), (kit,)
+    yield ("scene", data["scene"]["kind"]), ("scene",)
+    for name, rule in data.get("rules", {}).items():
+        yield ("rule", rule["kind"]), ("rules", name)
+    for section in ("objects", "robots"):
+        for name, thing in data[section].items():
+            yield ("model", thing["model"]), (section, name)
+            for what in ("sensor", "actuator", "rule"):
+                for label, component in thing.get(f"{what}s", {}).items():
+                    place = (section, name, f"{what}s", label)
+                    yield ("entity_rule" if what == "rule" else what, component["kind"]), place
+                    for at, modifier in enumerate(component.get("modifiers", ())):
+                        yield ("modifier", modifier["kind"]), (*place, "modifiers", at)
 
 
-@EACH
-def test_settings_beyond_their_limits_are_refused_at_their_place(key: Key) -> None:
-    """Those of different settings together, where each is told of; the others one by one."""
-    waiting = [edge for edge in edges(registry.find(*key[:2]), ALL[key]) if not edge.is_within]
-    while waiting:
-        together = list({edge.place: edge for edge in reversed(waiting)}.values())
-        told = problem_of(key, *together).splitlines()
-        for edge in together:
-            waiting.remove(edge)
-            place = place_of(key, edge)
-            if not any(f" {place}: " in line and str(edge.value) in line for line in told):
-                problem = problem_of(key, edge)
-                assert f" {place}: " in problem or f" {place.rpartition('.')[0]}: " in problem, (edge.label, problem)
+def section(data: Mapping[str, Any], place: Place) -> Any:
+    found: Any = data
+    for key in place:
+        found = found[key]
+    return found
 
 
-def place_of(key: Key, edge: Edge) -> str:
-    return re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, (*ALL[key].place, *edge.place))))
+def edges(form: ComponentType, data: Mapping[str, Any], place: Place) -> Iterator[Edge]:
+    """Yield the limits of each of a component's settings that has any, and what lies just beyond."""
+    for count, setting in enumerate(as_json(form)["settings"]):
+        at = (*place, *_placed(setting["key"].split("."), section(data, place)))
+        quantity, number = QUANTITY.fullmatch(setting["value"]), NUMBER.fullmatch(setting["value"])
+        if quantity is not None:
+            low, unit, high, other = quantity.groups()
+            yield Edge(at, f"{low} {unit}", is_within=True)
+            yield Edge(at, f"{high} {other}", is_within=True)
+            yield Edge(at, f"{_less(float(low)):.9g} {unit}", is_within=False)
+            yield Edge(at, f"{-_less(-float(high)):.9g} {other}", is_within=False)
+        elif number is not None:
+            kind, least, most = number.groups()
+            made, step = (int, 1) if kind == "integer" else (float, 0.001)
+            for limit, beyond in ((least, -step), (most, step)):
+                if limit is not None:
+                    yield Edge(at, made(limit), is_within=True)
+                    yield Edge(at, made(limit) + beyond, is_within=False)
+        else:
+            continue
+        yield Edge(at, NOTHING[count % len(NOTHING)], is_within=False)
+    yield Edge((*place, "unheard_of"), "1 m", is_within=False)
 
 
-def problem_of(key: Key, *changed: Edge) -> str:
-    """Return why a deployment with these settings is refused; nothing where it is not."""
+def _less(number: float) -> float:
+    return number - max(abs(number) * 0.01, 0.001)
+
+
+def _placed(keys: Sequence[str], settings: Any) -> Place:
+    """Return the place of a setting; of one that any name may have, in the first that the world has."""
+    place: list[str | int] = []
+    for key in keys:
+        name = next(iter(settings)) if key == "NAME" and settings else key
+        place.append(name)
+        settings = settings.get(name, {}) if isinstance(settings, dict) else {}
+    return tuple(place)
+
+
+def edges_of(whole: str) -> list[Edge]:
+    """Return those of each component that a world names, once."""
+    data = data_of(whole)
+    first: dict[Key, Place] = {}
+    for key, place in places(data):
+        first.setdefault(key, place)
+    return [edge for key, place in first.items() for edge in edges(registry.find(*key), data, place)]
+
+
+def with_settings(whole: str, *changed: Edge) -> str:
+    """Return a world's text with other settings."""
+    data = data_of(whole)
+    for edge in changed:
+        inner: Any = data
+        for key in edge.place[:-1]:
+            inner = inner.setdefault(key, {}) if isinstance(inner, dict) else inner[key]
+        inner[edge.place[-1]] = json.loads(json.dumps(edge.value))
+    return written(data)
+
+
+def problem_of(whole: str, *changed: Edge) -> str:
+    """Return why a world with these settings is refused; nothing where it is not."""
     try:
-        load_deployment(ALL[key].text(*[(edge.place, edge.value) for edge in changed]), NAME)
+        text, files = pin_assets(with_settings(whole, *changed), NAME, folder_of(whole))
+        load_deployment(text, NAME).with_assets(files)
     except DeploymentError as error:
         return str(error)
     return ""
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize("seed", range(1, 4))
 @EACH
-def test_it_obeys_the_laws_for_long(key: Key, seed: int) -> None:
-    text = ALL[key].text().replace("seed: 1\n", f"seed: {seed}\n")
-    check = ComponentCheck(text, NAME, 2_000, seed)
-    assert [*check.broken(), *elsewhere(text, NAME, 2_000, check.first)] == []
+def test_settings_beyond_their_limits_are_refused_at_their_place(whole: str) -> None:
+    """Those of different settings together, as long as some of them are told of; the others one by one."""
+    waiting = [edge for edge in edges_of(whole) if not edge.is_within]
+    assert len(waiting) > 100
+    while waiting:
+        together = list({edge.place: edge for edge in reversed(waiting)}.values())[:TOGETHER]
+        lines = problem_of(whole, *together).splitlines()
+        told = [edge for edge in together if is_told(edge.place, lines)]
+        if not told:
+            told = together[:1]
+            (edge,), lines = told, problem_of(whole, *told).splitlines()
+            assert is_told(edge.place, lines) or is_told(edge.place[:-1], lines), (edge, lines)
+        for edge in told:
+            waiting.remove(edge)
+
+
+def is_told(place: Place, lines: Sequence[str]) -> bool:
+    """Return whether a line is about a place: of an unknown key, about the section that it is in."""
+    *names, last = (rf"\[{key}\]" if isinstance(key, int) else f".{re.escape(key)}" for key in place)
+    names += ["" if last == ".unheard_of" else last]
+    names[1:2] = [rf"{name}(-\d+)?" for name in names[1:2]]
+    pattern = re.compile(f" {''.join(names)[1:]}: ")
+    return any(pattern.search(line) for line in lines)
+
+
+@pytest.mark.parametrize("key", ALONE, ids="-".join)
+def test_a_scene_of_a_world_of_its_own_obeys_the_laws(key: Key) -> None:
+    assert list(broken_laws(ALONE[key].text(), NAME, TICKS)) == []
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(1, 7))
+@EACH
+def test_the_laws_hold_for_long(whole: str, seed: int) -> None:
+    text, files = pin_assets(written(data_of(whole) | {"seed": seed}), NAME, folder_of(whole))
+    check = ComponentCheck(text, NAME, 2_000, seed, files=files)
+    assert list(check.broken()) == []
+    assert whole != "mixed" or list(elsewhere(text, NAME, 2_000, check.first)) == []
 
 
 @pytest.mark.campaign
 @EACH
-def test_settings_at_their_limits_run_or_are_refused(key: Key) -> None:
+def test_settings_at_their_limits_run_or_are_refused(whole: str) -> None:
     """On two nodes as on one."""
-    for edge in edges(registry.find(*key[:2]), ALL[key]):
-        if edge.is_within and not problem_of(key, edge):
-            text = ALL[key].text((edge.place, edge.value))
-            one, two = (rehearse(text, NAME, 200, nodes) for nodes in (1, 2))
-            assert not one.json["failed"], (edge.label, one.json["reason"])
-            assert one.digests == two.digests, edge.label
+    for edge in edges_of(whole):
+        if edge.is_within and not problem_of(whole, edge):
+            text = with_settings(whole, edge)
+            one, two = (rehearse(text, NAME, 100, nodes, folder=folder_of(whole)) for nodes in (1, 2))
+            assert not one.json["failed"], (edge, one.json["reason"])
+            assert one.digests == two.digests, edge

@@ -31,15 +31,9 @@ from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.network.memory import Joining
 from foosim.vhub.stages.receiver import RECEIVER_DOWN
 from foosim.vhub.state.existence import robots_it_lives_by
-from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
-from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.edits import written
-from foosim.world.frame import Frame
-from foosim.world.setting.settable import add_edit
 from tests.kinematic_yard import yard_text
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -221,11 +215,6 @@ def test_a_player_is_made_at_its_start_and_when_it_exists_again(monkeypatch: pyt
 def test_who_has_no_robot_always_exists() -> None:
     assert [*usual().gos[ALWAYS]] == [*range(0, TICKS, PERIOD)]
     assert {go.since for go in usual().gos[ALWAYS].values()} == {0}
-
-
-@pytest.mark.parametrize("nodes", [2, 3])
-def test_the_run_is_the_same_on_any_number_of_nodes(nodes: int) -> None:
-    assert_the_same(fly(nodes))
 
 
 def assert_the_same(seen: Seen) -> None:
@@ -431,27 +420,6 @@ def test_nodes_that_may_go_ahead_stop_where_a_player_may_exist_again(tick: int) 
     assert [*seen.gos["pilot-2"]] == acts
     assert min(seen.gos["waits"]) == min(tick + 3, first + 1), "2 ticks after it exists, or at what it hears"
     assert {go.since for its in seen.gos.values() for go in its.values()} == {0, tick + 1}
-
-
-def test_who_leaves_and_comes_back_exists_since_it_did_and_who_missed_an_add_is_another() -> None:
-    """Of the vHub's state: a process that was cut off has its memory, and is told whether that counts."""
-    deployment = load_deployment(quiet(()), "yard.yaml")
-    state, frame = HubState(deployment), initial_frame(deployment)
-    layout, absent = frame.layout, frame.numbers
-    there = written(layout, absent, [add_edit(deployment, layout, absent, layout["cart-2"], None)])
-    joining = Joining("pilot-2", 1, [], 0)
-    found = []
-    for tick, numbers in enumerate((absent, there, there, there, absent, there, there)):
-        if tick in (0, 3, 6):
-            state.join(joining, tick)
-        if tick in (2, 4):
-            state.leave("pilot-2")
-        frame = Frame(tick, layout, None, numbers=[*numbers])
-        state.close_world(frame, [], [])
-        found.append((state.members["pilot-2"].since, state.due_members(tick) == ["pilot-2"]))
-        state.close_clients(frame, {}, [])
-        state = HubState.restore(deployment, state.snapshot())
-    assert found == [(-1, False), (1, True), (1, False), (1, True), (-1, False), (5, False), (5, True)]
 
 
 def test_a_simulation_over_the_network_has_the_digests_of_the_run() -> None:

@@ -27,7 +27,6 @@ from foosim.simulation.system import Settings, System
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing
-from foosim.world.forms.forms import ABSENT
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 240
@@ -161,31 +160,6 @@ def test_a_vhub_that_does_not_come_back_ends_the_run_in_order() -> None:
     assert (entry["what"], entry["outage_ms"]) == ("vhub", None)
 
 
-def test_a_node_is_lost_while_the_vhub_is_away() -> None:
-    faults: list[Fault] = [
-        (60, kill_hub("unpublished")),
-        (60, lambda system: system.later(100 * MS, partial(system.kill, "n2"))),
-        (120, lambda system: system.start("n2")),
-        (150, lambda system: system.kill("n1")),
-        (150, kill_hub("torn")),
-    ]
-    seen = fly(faults)
-    assert seen.run.digests == undisturbed().run.digests and seen.rows() == undisturbed().rows()
-    assert [entry["what"] for entry in seen.run.json["recoveries"]] == ["node", "vhub", "join", "node", "vhub"]
-
-
-def test_a_ball_is_added_while_the_vhub_is_away() -> None:
-    """Then others are present in its last record than in the last commit."""
-
-    def add(system: System) -> None:
-        system.request("add", name="ball", at="0.15,0,0.02")
-
-    usual = fly([(50, add), (120, lambda system: system.request("remove", name="ball-2"))])
-    seen = fly([(50, add), (53, kill_hub("torn")), (120, lambda system: system.request("remove", name="ball-2"))])
-    assert seen.run.json["reason"] == "done" and {c.frame.at("ball-2", ABSENT) for c in seen.closings} == {0.0, 1.0}
-    assert len(seen.run.digests) == len(usual.run.digests) == TICKS
-
-
 def test_an_epoch_that_is_older_than_the_newest_in_the_journal_is_refused() -> None:
     cores: list[HubCore] = []
     epochs: list[int] = []
@@ -245,20 +219,6 @@ class _Hasty(HubCore):
 def test_a_planted_fault_is_found(planted: type[HubCore]) -> None:
     with pytest.raises(AssertionError):
         assert_the_same(fly([(73, kill_hub("unpublished"))], hub=planted), undisturbed())
-
-
-@pytest.mark.parametrize(("hub_ms", "supervisor_ms"), [(50, 400), (400, 50)])
-def test_supervisor_and_vhub_are_lost_together(hub_ms: int, supervisor_ms: int) -> None:
-    """Each goes on from its own journal, whoever is back first."""
-
-    def both(system: System) -> None:
-        system.kill(channels.SUPERVISOR)
-        system.kill_hub("now", hub_ms * MS)
-        system.later(supervisor_ms * MS, partial(system.start, channels.SUPERVISOR))
-
-    seen = fly([(80, both), (160, both)], keeps_journals=True)
-    assert_the_same(seen, undisturbed())
-    assert {entry["what"] for entry in seen.run.json["recoveries"]} >= {"supervisor"}
 
 
 def test_a_vhub_that_dies_before_the_run_begins_is_waited_for() -> None:

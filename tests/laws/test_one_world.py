@@ -1,6 +1,8 @@
 """Laws 1 and 3 over whole worlds: nodes, owners, moves, engines made anew, losses and a bad bus change nothing.
 
-The four deployments, the workshop, the swarm's living world, and worlds that hold every form beside one another.
+The four deployments, the workshop, the swarm's living world, and worlds that hold every form beside one another. A run
+on one node is compared with a run on three whose processes die; that one's capture with the world simulated again, from
+its start and from frames within, and with its packets judged again; and the run with a `Simulation`.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -27,14 +30,16 @@ from foosim.library.table.settings import table_of
 from foosim.node.physics.mujoco_islands import CompositionEngine
 from foosim.node.physics.pure_engine import PureEngine
 from foosim.node.tick import Stepper, Work
+from foosim.protocol.channels import SUPERVISOR
 from foosim.runtime.roles.bus import CALM, Weather
 from foosim.simulation.check.component_check import ComponentCheck
 from foosim.simulation.check.component_check import _shuffle as shuffle
 from foosim.simulation.failures import Stuck
 from foosim.simulation.journals import ENDINGS
 from foosim.simulation.run import Rehearsed, rehearse
+from foosim.simulation.simulation import Simulation
 from foosim.simulation.system import Settings, System
-from foosim.simulation.verify import verify_capture
+from foosim.simulation.verify import Between, verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.vhub.state.records import Closing
 from foosim.world.assembly.islands import Assignment, Share, islands_of, table_reach_of, touching_of
@@ -51,11 +56,15 @@ from tests.forms.test_forms import ALONE, own
 from tests.forms.worlds import DEPLOY, still
 from tests.frames import Frames
 from tests.placing import place_ball
+from tests.simulation.test_verify import messages_of
 from tests.swarm.world_bounds import strays
 from tests.whole_worlds import NAME, assets, mixed, written, yard
 
 TABLE: Final = DEPLOY / "table.yaml"
 SWARM: Final = Path(__file__).parents[1] / "swarm"
+BACK_NS: Final = 5_000_000
+OF_THE_WORLD: Final = ("/tick", "/frame", "/packets", "/clients", "/ages", "/tf", "/scene", "/layout")
+"""Topics that do not name nodes."""
 PATIENT: Final = tuple(
     f"deadlines.{name}=1 h" for name in ("heartbeat", "tick_named", "tick_lost", "lockstep_fast", "client_back")
 )
@@ -74,11 +83,12 @@ class World:
 
 
 class Ran(NamedTuple):
-    """A run: its result, its frames and the fates of all packets."""
+    """A run: its result, its frames, the fates of all packets, and what its capture has of the world."""
 
     result: Rehearsed
     frames: list[Frame]
     fates: list[Any]
+    captured: dict[str, list[tuple[int, int, bytes]]]
 
     @property
     def digests(self) -> list[bytes]:
@@ -114,8 +124,8 @@ WORLDS: Final = (
 )
 
 
-def run(world: World, nodes: int, sets: Sequence[str] = (), **how: Any) -> Ran:
-    """Rehearse a world; return the result with all frames and the fates of all packets."""
+def run(world: World, nodes: int, sets: Sequence[str] = (), capture: Path | None = None, **how: Any) -> Ran:
+    """Rehearse a world; return the result with all frames, the fates of all packets, and what was captured."""
     frames, fates = Frames(), list[Any]()
 
     def close(closing: Closing) -> None:
@@ -124,16 +134,18 @@ def run(world: World, nodes: int, sets: Sequence[str] = (), **how: Any) -> Ran:
             for one in closing.fates
         )
 
-    settings = Settings(on_commit=frames, on_closing=close, weather=how.pop("weather", CALM))
-    found = rehearse(world.text, NAME, world.ticks, nodes, sets, settings, folder=world.folder, **how)
+    settings = Settings(on_commit=frames, on_closing=close, weather=how.pop("weather", CALM), keeps_journals=True)
+    found = rehearse(world.text, NAME, world.ticks, nodes, sets, settings, capture=capture, folder=world.folder, **how)
     assert not found.json["failed"] and found.json["ticks"] == world.ticks, found.json["reason"]
-    return Ran(found, frames.frames, fates)
+    captured = messages_of(capture) if capture is not None else {}
+    return Ran(found, frames.frames, fates, {topic: captured[topic] for topic in OF_THE_WORLD if topic in captured})
 
 
 @cache
 def alone(name: str) -> Ran:
     """Return a world on one node, where nothing is lost; enough happens in it."""
-    found = run(world_of(name), 1, PATIENT)
+    with TemporaryDirectory() as folder:
+        found = run(world_of(name), 1, PATIENT, Path(folder) / "alone.mcap")
     frames = found.frames
     for slot in world_of(name).happens:
         places = [entity.offsets[slot] for entity in frames[0].layout.entities if slot in entity.offsets]
@@ -148,7 +160,7 @@ def loaded(name: str) -> Deployment:
 
 
 def disturb(system: System, seed: int, ticks: int) -> None:
-    """Move robots and make engines anew, lose nodes and the vHub and bring them back, at drawn ticks."""
+    """Move robots and make engines anew, lose nodes, supervisor and vHub and bring them back, at drawn ticks."""
     shuffle(system, seed=seed, ticks=ticks)
     draw = Random(seed)
 
@@ -158,29 +170,55 @@ def disturb(system: System, seed: int, ticks: int) -> None:
         elif len(system.supervisor.state.members) > 1:
             system.kill(node)
 
+    def lose_supervisor() -> None:
+        system.kill(SUPERVISOR)
+        system.later(BACK_NS, partial(system.start, SUPERVISOR))
+
+    system.at_tick(draw.randrange(4, ticks - 20), lose_supervisor)
     for number in range(9):
         system.at_tick(draw.randrange(4, ticks - 20), partial(lose, f"n{1 + number % 3}"))
     for ending in ENDINGS:
-        system.at_tick(draw.randrange(4, ticks - 20), partial(system.kill_hub, ending, 5_000_000))
+        system.at_tick(draw.randrange(4, ticks - 20), partial(system.kill_hub, ending, BACK_NS))
 
 
 @pytest.mark.parametrize("name", WORLDS)
 @pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(1, 9))])
 def test_nodes_moves_losses_and_a_bad_bus_give_the_same_world(name: str, seed: int, tmp_path: Path) -> None:
-    """To the last bit and packet, and so is its capture: simulated again on three nodes, and judged again."""
-    world, usual = world_of(name), alone(name)
+    """To the last bit, packet and row."""
+    world, usual, deployment = world_of(name), alone(name), loaded(name)
     path, weather = tmp_path / "run.mcap", Weather(seed, delay_ns=100_000, spread_ns=2_000_000, loss=0.01, repeat=0.05)
     prepare = partial(disturb, seed=seed, ticks=world.ticks)
-    many = run(world, 3, PATIENT, weather=weather, prepare=prepare, capture=path)
+    many = run(world, 3, PATIENT, path, weather=weather, prepare=prepare)
     where = next((at + 1 for at, (a, b) in enumerate(zip(usual.digests, many.digests, strict=True)) if a != b), None)
     assert where is None, f"seed {seed}"
     assert many.fates == usual.fates and len(usual.fates) > 100
-    told = many.result.json
-    assert told["packets"] == usual.result.json["packets"] and told["handovers"] + told["moves"] > 0
-    assert {entry["what"] for entry in told["recoveries"]} >= {"node", "join", "vhub"}
-    assert verify_capture(path, 3).equal and what_if(open_capture(path)).changed == 0
-    deployment = loaded(name)
+    result = many.result.json
+    for key in ("packets", "summary", "digest"):
+        assert result[key] == usual.result.json[key], key
+    assert result["handovers"] + result["moves"] > 0
+    assert {entry["what"] for entry in result["recoveries"]} >= {"node", "join", "vhub", "supervisor"}
+    assert many.captured == usual.captured and {"/tick", "/frame", "/packets"} <= many.captured.keys()
+    assert_repeats(path, Random(seed), usual)
     assert [wrong for frame in usual.frames[::4] for wrong in strays(deployment, frame)] == [], "out of bounds"
+    with Simulation(deployment, agents=[], network=True) as simulation:
+        for digest in usual.digests:
+            simulation.step()
+            assert simulation.frame.digest == digest, f"stepped, at tick {simulation.tick}"
+
+
+def assert_repeats(path: Path, draw: Random, usual: Ran) -> None:
+    """Hold that a capture is simulated again, from its start and from frames within, and its packets judged again."""
+    verified, capture, ticks = verify_capture(path, 3), open_capture(path), len(usual.digests)
+    assert verified.equal and verified.ticks == ticks and verified.other_arithmetic == ()
+    assert verified.chain.hex() == usual.result.json["digest"]["chain"]
+    judged = what_if(capture)
+    assert (judged.changed, judged.inputs_changed) == (0, 0) and judged.packets == len(capture.packets)
+    frames, inputs, between = list(capture.each_frame()), list(capture.captured_ticks()), Between(capture.about)
+    for start in (*draw.choices(frames[:-1], k=2), frames[0]):
+        until = draw.randrange(start.tick + 1, ticks + 1)
+        found = between(start, inputs[start.tick + 1 : until + 1])
+        assert found is not None and found.digest == usual.digests[until - 1], f"from {start.tick} to {until}"
+    between.close()
 
 
 def test_on_many_nodes_without_losses() -> None:
@@ -198,7 +236,7 @@ def test_every_form_is_in_a_world_of_all_or_has_its_laws_tested_alone() -> None:
     used: set[tuple[str, str]] = set()
     for name in WHOLE:
         used |= {(form.type_name, form.name) for form in forms_of(loaded(name))}
-    assert set(own()) - used == ALONE
+    assert set(own()) - used == {*ALONE}
 
 
 @pytest.mark.parametrize("name", WHOLE)

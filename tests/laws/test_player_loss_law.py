@@ -142,19 +142,6 @@ def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_late
     assert [joining.name for record in joins for joining in record.joins] == [RED]
 
 
-def test_a_vhub_that_dies_before_the_record_gives_the_player_its_time_again(tmp_path: Path) -> None:
-    """And one that dies behind it goes on without the player, whose return is as it would have been."""
-    for ending in ("torn", "unpublished"):
-
-        def also(system: System, ending: Any = ending) -> None:
-            system.at_tick(100, lambda: system.later(190 * MS, lambda: system.kill_hub(ending, 50 * MS)))
-
-        run = Run(tmp_path / f"{ending}.mcap", "realtime", 500, *SOON, also=also)
-        run.check()
-        (_, left, back) = run.comings()
-        assert (left[1], back[1]) == ("leaves_owing", "joins") and left[0] < back[0]
-
-
 @pytest.mark.parametrize(
     ("pace", "line"), [("fast", 0), ("fast", 1), ("realtime", 0), ("realtime", 1), ("realtime", 2), ("realtime", -1)]
 )

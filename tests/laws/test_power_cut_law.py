@@ -134,11 +134,6 @@ def _reboot(system: System) -> None:
     system.hub_journal.machine = "machine-2"
 
 
-def test_a_vhub_that_was_only_killed_goes_on() -> None:
-    cut = Cut([(90, lambda system: system.kill_hub("torn"))])
-    assert cut.state.end is not None and cut.state.end.reason == "done" and cut.frames == undisturbed()
-
-
 @pytest.mark.parametrize(("hub", "supervisor"), [(40, 9), (20, 120), (300, 60), (1, 1)])
 @pytest.mark.parametrize("nodes_too", [False, True])
 def test_a_supervisor_that_was_started_again_ends_it_too(hub: int, supervisor: int, nodes_too: bool) -> None:

@@ -71,15 +71,6 @@ def told(run: Rehearsed) -> list[tuple[str, str]]:
     return [(entry["what"], entry["name"]) for entry in run.json["recoveries"]]
 
 
-def test_nodes_are_killed_and_come_back() -> None:
-    faults = [(40, kill("n2")), (80, start("n2")), (120, kill("n1")), (160, start("n1")), (250, kill("n3"))]
-    run = disturbed(faults)
-    assert run.digests == undisturbed().digests
-    assert told(run) == [("node", "n2"), ("join", "n2"), ("node", "n1"), ("join", "n1"), ("node", "n3")]
-    assert all(entry["outage_ms"] is not None for entry in run.json["recoveries"])
-    assert run.json["handovers"] >= 1 and not run.json["failed"] and run.json["reason"] == "done"
-
-
 def test_robots_go_back_to_the_node_that_they_were_adopted_from() -> None:
     owned: list[dict[str, list[str]]] = []
 
@@ -166,11 +157,6 @@ def test_an_epoch_without_a_node_is_no_answer_to_its_ready() -> None:
     assert run.digests == undisturbed().digests
 
 
-def test_a_short_pause_costs_nobody_its_membership() -> None:
-    run = disturbed([(100, pause("n2", 200))], pace=Pace("realtime"))
-    assert run.digests == undisturbed().digests and told(run) == []
-
-
 @pytest.mark.parametrize("sets", ["nodes.n2.required=true", "on_node_loss=stop"])
 def test_where_the_deployment_says_so_the_run_ends(sets: str) -> None:
     run = disturbed([(100, kill("n2"))], sets=(*PURE, sets))
@@ -193,17 +179,6 @@ def restart(down_ms: int = 0, amid: int = 0) -> Callable[[System], object]:
             system.later(max(1, down_ms * MS), partial(start_again, system))
 
     return do
-
-
-def test_the_supervisor_is_started_again_and_again() -> None:
-    faults = [(1, restart()), (9, restart(0, 1)), (60, restart(500)), (70, restart(0, 2)), (200, restart(0, 3))]
-    run = disturbed([*faults, (120, kill("n2")), (125, restart()), (150, start("n2"))], keeps_journals=True)
-    same = undisturbed()
-    assert run.digests == same.digests and run.json["digest"] == same.json["digest"]
-    assert [what for what, _ in told(run)] == 4 * ["supervisor"] + ["node", "supervisor", "join", "supervisor"]
-    assert run.json["packets"] == same.json["packets"]
-    assert sum(node["solved_ticks"] for node in run.json["nodes"].values()) >= TICKS
-    assert run.json["reason"] == "done"
 
 
 @pytest.mark.parametrize("call", [1, 2])
@@ -336,16 +311,3 @@ def test_with_freeze_an_operators_down_holds_when_the_node_is_back() -> None:
     run = disturbed([*faults, (90, look), (100, start("n2")), (200, look)], sets=(*PURE, "on_node_loss=freeze"))
     assert down == [[*its[:2], *its[3:]], its[:2]]
     assert run.json["reason"] == "done" and not run.json["failed"]
-
-
-def test_a_ball_that_is_added_while_a_node_is_lost() -> None:
-    faults: list[Fault] = [
-        (50, lambda system: system.request("add", name="ball", at="0.15,0,0.02")),
-        (50, kill("n2")),
-        (150, start("n2")),
-        (200, lambda system: system.request("remove", name="ball-2")),
-        (203, kill("n3")),
-    ]
-    run = disturbed(faults)
-    assert run.json["reason"] == "done" and len(run.digests) == TICKS
-    assert told(run) == [("node", "n2"), ("join", "n2"), ("node", "n3")]

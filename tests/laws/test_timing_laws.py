@@ -73,19 +73,6 @@ def test_players_and_sensors_with_offsets_act_at_their_ticks() -> None:
     assert joined == {"player-red": 2, "player-blue": 8}
 
 
-def test_with_offsets_one_node_or_three_are_the_same_world() -> None:
-    alone, _ = run(1, OFFSETS)
-    many, said = run(3, OFFSETS)
-    assert alone.digests == many.digests == with_offsets().run.digests
-    assert many.json["packets"]["delivered"] > 0
-    assert max(deliveries.following for deliveries in said) > 0, "there are ticks between theirs at which nobody sends"
-
-
-def test_with_offsets_a_vhub_that_is_killed_loses_nothing() -> None:
-    killed = [(3, kill_hub("now")), (58, kill_hub("torn")), (90, kill_hub("now", 5_000_000))]
-    assert_the_same(fly(killed, TICKS, OFFSETS), with_offsets())
-
-
 UNEVEN: Final = (
     *SETS,
     *BY_PERIOD,

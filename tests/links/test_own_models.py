@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +17,6 @@ from foosim.cli.net import linted
 from foosim.common.errors import DeploymentError
 from foosim.common.keyed_random import draw_words
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.network.settings_text import impairments_text, radio_text
 from foosim.protocol.messages import Sent
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
@@ -27,9 +25,7 @@ from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.custom_models import ModelError, Passage, check_link_models, differing_models, model_versions
 from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.stages.custom_model import MODEL, MODEL_FAILED
-from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing
-from foosim.world.scene import Vector
 from tests.links.offered import MS, TABLE, Hub, deployment_of, every, fates, rule
 from tests.links.packages import ALL, install
 from tests.links.proof import Proof
@@ -125,30 +121,6 @@ def test_what_a_model_is_given() -> None:
     assert set(first.words).isdisjoint(draw_words(draws.key, 1)), "those of the named slots are others'"
 
 
-def test_the_velocity_of_a_rod_and_of_a_rover() -> None:
-    from foosim.vhub.line_of_sight.placement import World
-    from foosim.world.assembly.initial_state import initial_frame
-    from foosim.world.frame import Frame
-
-    def velocity(deployment: Any, name: str, **fields: tuple[float, ...]) -> Vector:
-        start = initial_frame(deployment)
-        values = start.values.copy()
-        for field, numbers in fields.items():
-            at = start.layout[name].offsets[field]
-            values[at : at + len(numbers)] = numbers
-        world = World(deployment, deployment.network)
-        world.turn_to(Frame(0, start.layout, values))
-        return world.velocity(name)
-
-    assert velocity(deployment_of(), "red.goal", joint_velocities=(0.5, 9.0)) == (0.0, 0.5, 0.0)
-    hall = load_deployment((TABLE.parent / "warehouse.yaml").read_text(), "warehouse.yaml")
-    rover = next(name for name, robot in hall.robots.items() if robot.model == "rover")
-    half = 0.5**0.5
-    turned = {"orientation": (0.0, 0.0, half, half), "angular_velocity": (0.0, 0.0, 1.0)}
-    moving = velocity(hall, rover, linear_velocity=(0.0, 0.3, 0.0), **turned)
-    assert moving == pytest.approx((0.0, 0.3, 0.0))
-
-
 def test_the_example_of_the_guide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What docs/explanation/network.md shows, in a package as it says."""
     guide = (TABLE.parents[1] / "docs" / "explanation" / "network.md").read_text()
@@ -230,16 +202,6 @@ def test_a_capture_without_its_package(tmp_path: Path, foggy: Path, monkeypatch:
     refused = replay("what-if", tmp_path / "run.mcap", "--network", other)
     assert refused.code == 2 and refused.err.startswith(f"{other}:3:49: network.links[0].model.name: not a")
     assert replay("what-if", tmp_path / "run.mcap", "--set", "network.links.all.model=null").code == 0
-
-
-def test_a_report_shows_the_model_with_its_parameters() -> None:
-    """Whatever these are called, and are."""
-    model = "model: {name: fog, parameters: {loss: many, late_ns: [1, {a: null}]}}"
-    (link,) = deployment_of(rule(f"{model}, loss: 1 %, order: free")).network.links
-    told = 'link model fog {"loss":"many","late_ns":[1,{"a":null}]}'
-    assert told in impairments_text(link)
-    radio = deployment_of(f"network.radios={{r: {{preset: wifi_5_indoor, {model}}}}}").network.radios["r"]
-    assert told in radio_text(radio)
 
 
 # --- what fails -------------------------------------------------------------------------------------------------------
@@ -351,25 +313,3 @@ def test_a_vhub_on_another_machine_has_its_own(tmp_path: Path) -> None:
 def test_a_deployment_names_a_model_and_brings_no_code(model: str, problem: str) -> None:
     with pytest.raises(DeploymentError, match=problem):
         network(f"model: {model}")
-
-
-def test_an_event_does_not_change_a_model() -> None:
-    with pytest.raises(DeploymentError, match="unknown key, 'model'"):
-        deployment_of(rule("loss: 1 %"), "network.events=[{at: 1 s, set: {link: tried, model: {name: fog}}}]")
-
-
-@pytest.mark.usefixtures("foggy")
-def test_a_state_that_was_written_down_goes_on_with_what_a_model_remembers() -> None:
-    deployment = deployment_of(rule(FOG), places(4))
-    sent = [Sent(number, "b", "data", 0, bytes(9)) for number in range(1, 41)]
-    whole, first = Hub(deployment), Hub(deployment)
-    for hub in (whole, first):
-        hub.close({"a": sent[:20]})
-    second = Hub(deployment, HubState.restore(deployment, first.state.snapshot()))
-    for hub in (whole, second):
-        hub.close({"a": sent[20:]})
-        hub.close({})
-    assert whole.state.snapshot() == second.state.snapshot()
-    kept = whole.state.fabric.states["a", "b", "tried"].model
-    assert msgspec.msgpack.decode(kept)["passed"] + msgspec.msgpack.decode(kept)["lost"] == 40
-    assert json.dumps(msgspec.msgpack.decode(kept))

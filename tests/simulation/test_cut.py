@@ -9,7 +9,6 @@ import msgspec
 import pytest
 
 from foosim.capture.cut import cut_capture
-from foosim.capture.diff import diff_captures
 from foosim.capture.export import export_capture
 from foosim.capture.foxglove import POSES, SCENE
 from foosim.capture.info import capture_info
@@ -19,7 +18,7 @@ from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, PACKETS, TICK
 from foosim.capture.start_frame import read_branch
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import load_deployment
-from tests.simulation.conftest import TICK_NS, added_tick, contents_of, damaged, messages_of, replay
+from tests.simulation.conftest import TICK_NS, added_tick, damaged, messages_of, replay
 
 MS = 1_000_000
 
@@ -60,24 +59,6 @@ def test_digest_and_chain_are_those_of_the_whole_at_that_tick(run: Path, part: P
     assert info.duration_ns == 80 * TICK_NS
     assert (info.metadata["cut_from"], info.metadata["cut_tick"]) == ("run.mcap", "120")
     assert info.end == {"reason": "cut", "last_tick": "200"}
-
-
-def test_a_cut_of_a_cut_is_the_cut(run: Path, part: Path, tmp_path: Path) -> None:
-    cut_capture(part, tmp_path / "one.mcap", 290 * MS, 350 * MS)
-    cut_capture(run, tmp_path / "two.mcap", 290 * MS, 350 * MS)
-    found = diff_captures(tmp_path / "one.mcap", tmp_path / "two.mcap")
-    assert found.equal and found.about == ("metadata cut_from",)
-    assert capture_info(tmp_path / "one.mcap").chain == capture_info(tmp_path / "two.mcap").chain
-
-
-def test_what_a_part_leaves_out_is_all_that_it_differs_in(run: Path, tmp_path: Path) -> None:
-    cut_capture(run, tmp_path / "all.mcap")
-    found = diff_captures(run, tmp_path / "all.mcap")
-    assert found.equal and [channel.rows for channel in found.channels.values()] == [
-        channel.rows for channel in diff_captures(run, run).channels.values()
-    ]
-    (end,) = (content for content in contents_of(tmp_path / "all.mcap") if getattr(content, "name", "") == "foosim.end")
-    assert end.metadata["reason"] == "cut"
 
 
 def test_the_layout_is_at_its_start_and_a_ball_that_is_added_within_comes_at_its_tick(

@@ -10,17 +10,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foosim.capture import contents as capture_contents
-from foosim.capture import writer as capture_writer
-from foosim.capture.diff import diff_captures
 from foosim.capture.info import capture_info
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import BadBranch, read_branch
 from foosim.common.units import parse_ns
 from foosim.deployment.loader import load_deployment
-from foosim.runtime.journal import Journal
-from foosim.simulation.run import rehearse
-from foosim.simulation.system import Settings
 from tests.simulation.conftest import TABLE, damaged, messages_of, replay
 
 
@@ -59,45 +53,6 @@ def test_a_finished_capture_is_clean(run: Path) -> None:
     before = run.read_bytes()
     done = replay("recover", run)
     assert done.code == 0 and done.out == f"capture {run} is finished already\n" and run.read_bytes() == before
-
-
-def test_without_a_journal_something_is_lost(run: Path, tmp_path: Path) -> None:
-    left = tmp_path / "left.mcap"
-    left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
-    done = replay("recover", left, "--json")
-    content = msgspec.json.decode(done.out)
-    assert done.code == 3 and not content["whole"] and content["torn_bytes"] > 0
-    assert content["problem"] == "there is no journal of it" and content["added_ticks"] == 0
-    made = tmp_path / "left.recovered.mcap"
-    assert content["path"] == str(made) and open_capture(made).finished and replay("recover", made).code == 0
-    assert not open_capture(left).finished
-
-
-def test_with_its_journal_nothing_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(capture_writer, "BATCH_ROWS", 100)
-    monkeypatch.setattr(capture_contents, "CHUNK_BYTES", 1)
-    path, left, journals = tmp_path / "run.mcap", tmp_path / "left.mcap", tmp_path / "journals"
-    records: list[bytes] = []
-
-    def note(process: str, record: bytes) -> None:
-        if process == "vhub":
-            records.append(record)
-
-    settings = Settings(on_journal=note)
-    rehearse(TABLE.read_text(), TABLE.name, 60, 1, ["engine=pure"], settings, capture=path)
-    with Journal(journals, "vhub") as journal:
-        for record in records:
-            journal.append(record)
-    left.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
-    made = tmp_path / "made.mcap"
-    done = replay("recover", left, "--journals", journals, "-o", made)
-    assert done.code == 0, done
-    assert "of them from its journal" in done.out
-    found = diff_captures(path, made)
-    differing = {topic for topic, channel in found.channels.items() if channel.first is not None}
-    assert differing <= {"/tick", "/tf", "/frame"}, "the last frame was committed only"
-    assert found.channels["/packets"].first is None, "each has its fate again"
-    assert int(open_capture(made).ticks[-1]) == 59, "the journal ends with the last closed tick"
 
 
 def spoiled(run: Path, out: Path, place: int, bit: int = 1) -> bytes:

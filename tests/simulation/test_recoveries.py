@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from foosim.capture.reader import open_capture
 from foosim.cli.capture.command import app
 from foosim.common import limits
 from foosim.protocol.channels import SUPERVISOR
-from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.messages import Commit
+from foosim.protocol.codec import decode_any
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
@@ -26,7 +24,6 @@ from foosim.supervisor.records import (
     Recovered,
     RecoveredRecord,
     close_outages,
-    fold,
 )
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -105,29 +102,6 @@ def test_a_supervisor_that_lost_its_commits_tells_nothing_twice(tmp_path: Path) 
     told = rows(tmp_path / "run.mcap")
     assert [what for what, *_ in told] == ["node", "supervisor", "join"] and len({*told}) == 3
     assert [entry["what"] for entry in run.json["recoveries"]] == ["node", "supervisor", "join"]
-
-
-def test_a_fold_takes_outages_as_they_were_told(tmp_path: Path) -> None:
-    """Not as the times of its commits say: the vHub's is longer than that."""
-    systems: list[System] = []
-
-    def lose(system: System) -> None:
-        systems.append(system)
-        system.kill("n2")
-
-    captured(tmp_path / "run.mcap", (40, lose))
-    journal = systems[0].journal
-    changed = [with_outage(decode_any(Record, raw), 12_345) for raw in journal]
-    history = fold(systems[0].supervisor.state.deployment, changed)
-    assert [entry.outage_ns for entry in history.recovered] == [12_345]
-
-
-def with_outage(record: Record, outage_ns: int) -> bytes:
-    if isinstance(record, CommitRecord):
-        commit = decode(Commit, record.commit)
-        told = [replace(entry, outage_ns=outage_ns) for entry in commit.recovered]
-        record = replace(record, commit=encode(replace(commit, recovered=told)))
-    return encode(record)
 
 
 @pytest.mark.parametrize("more", [0, 1, limits.RECOVERIES_PER_COMMIT_MAX])

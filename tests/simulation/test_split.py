@@ -67,11 +67,6 @@ def test_a_run_begins_with_a_frame_of_any_file(run: Path, split: Path) -> None:
     assert (mine.origin.chain, mine.values) == (theirs.origin.chain, theirs.values)
 
 
-def test_a_later_file_is_as_a_cut(split: Path) -> None:
-    done = replay("verify", split.with_name("run_0002.mcap"))
-    assert done.code == 2 and "a cut of run.mcap from tick 100 on" in done.err and "verify run.mcap" in done.err
-
-
 def test_a_file_that_is_missing_is_bad_input(tmp_path: Path, split: Path) -> None:
     for file in files_from(split):
         if not file.name.endswith("3.mcap"):

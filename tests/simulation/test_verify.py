@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from foosim.capture.reader import CapturedTick, open_capture
 from foosim.capture.rows import OwnerRow
 from foosim.cli.capture.command import app
 from foosim.cli.capture.options import BadCapture
-from foosim.cli.rehearse import app as rehearse_app
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.core import NodeCore
@@ -163,11 +161,3 @@ def test_a_capture_that_was_cut_off_is_equal_up_to_there(run: Path, tmp_path: Pa
         cut.write_bytes(nothing)
         for command in ("verify", "recover"):
             assert isinstance(runner.invoke(app, [command, str(cut)]).exception, BadCapture)
-
-
-def test_a_rehearsal_tells_people_its_packets_in_words() -> None:
-    table = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
-    done = CliRunner().invoke(rehearse_app, [str(table), "--for", "0.1s", "--engine", "pure"])
-    assert done.exit_code == 0
-    counts = r"packets \d+ offered, \d+ delivered, \d+ dropped, \d+ in flight; packets refused 0\n"
-    assert re.search(counts, done.output)

@@ -12,14 +12,13 @@ import pytest
 
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import open_capture
-from foosim.capture.rows import PACKETS, PacketRow
+from foosim.capture.rows import PACKETS
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment, with_network
 from foosim.simulation.run import rehearse
 from foosim.simulation.what_if import WhatIf, _age_ms, what_if
 from foosim.simulation.what_if_chart import draw
-from foosim.simulation.what_if_reader import Offers
-from tests.simulation.conftest import TABLE, TICKS, Done, capture_to, disturb, messages_of, replay, rewritten, with_row
+from tests.simulation.conftest import TABLE, Done, disturb, messages_of, replay, rewritten, with_row
 from tests.turns import BY_PERIOD
 
 NETWORKS: Final = {
@@ -53,23 +52,6 @@ def test_by_its_own_network_every_fate_is_the_captured_one(tmp_path: Path, netwo
     assert found.causes == found.new_causes
     assert all(link.before == link.after for link in found.links)
     assert sum(link.offered for link in found.links) <= found.packets
-
-
-def test_frames_of_every_tick_are_read_and_not_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    capture = open_capture(captured(tmp_path / "run.mcap", "wifi", "capture.frames_every=1 tick"))
-    monkeypatch.setattr("foosim.simulation.what_if_reader.captured_world", None)
-    assert what_if(capture).changed == 0
-
-
-def test_ticks_are_judged_while_the_capture_is_read(run: Path) -> None:
-    """What is held of it is what is in flight, and a chunk."""
-    capture = open_capture(run)
-    taken: list[PacketRow] = []
-    held = []
-    for offered in Offers(capture, "first", taken.append).ticks():
-        assert offered.row is not None
-        held.append(len(taken) - sum(row.sent_ns < offered.row.tick * capture.deployment.tick_ns for row in taken))
-    assert len(held) == TICKS and len(taken) > 900 and max(held) < 300
 
 
 def test_a_packet_that_stands_too_late_or_twice_is_refused(run: Path, tmp_path: Path) -> None:
@@ -163,13 +145,6 @@ def test_a_picture_has_two_bars_for_each_link_and_figure(run: Path) -> None:
     assert asdict(found)["changes"] == ()
 
 
-def test_a_picture_of_many_links_is_bounded(run: Path) -> None:
-    found = what_if(open_capture(run))
-    figure = empty_figure()
-    draw(figure, WhatIf(1, 0, 0, found.links * 40, {}, {}, ()), "run")
-    assert "the first 200 of" in figure.get_suptitle() and len(figure.axes[0].containers[0]) == 200
-
-
 def bad(run: Path, *arguments: str | Path) -> Done:
     typed = replay("what-if", run, *arguments)
     assert typed.code == 2, typed.out
@@ -187,15 +162,6 @@ def test_bad_input_is_refused_with_its_place(run: Path, tmp_path: Path) -> None:
     assert "nearest" in bad(run, "--set", "network.links.everything.los=4 %").err
     with pytest.raises(DeploymentError):
         with_network(TABLE.read_text(), TABLE.name, ("a: [", "x.yaml"), [])
-
-
-def test_an_unfinished_capture_is_judged_as_far_as_it_goes(tmp_path: Path) -> None:
-    whole = capture_to(tmp_path / "whole.mcap")
-    torn = tmp_path / "torn.mcap"
-    torn.write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
-    found = what_if(open_capture(torn))
-    assert found.packets > 0
-    assert "does not have the end of its run" in replay("what-if", torn).err
 
 
 def test_a_broadcast_whose_fate_is_behind_the_end_is_left_out(tmp_path: Path) -> None:

@@ -137,23 +137,6 @@ def test_a_ball_is_neither_added_nor_put_into_what_is_on_the_table(at: str, what
         assert answer.text.startswith(f"at of ball-2: a place that is occupied: ball-2 would be in {what}")
 
 
-def present(frame: Frame) -> list[str]:
-    """The names of the balls that are in the world in a frame."""
-    return [entity.name for entity in frame.layout.present(frame.numbers) if entity.model == "ball"]
-
-
-def test_an_added_ball_is_in_the_frame_after_its_tick() -> None:
-    run = Run(nodes=3).ask_at(30, "add", name="ball", at="0.3,0.2,0.05").go()
-    (answer,) = run.answers
-    assert answer.accepted and answer.text == f"ball-2 added at tick {answer.tick}"
-    assert ["ball-2" in present(frame) for frame in run.frames] == [frame.tick > answer.tick for frame in run.frames]
-    first = run.frames[answer.tick]
-    assert first.vector("ball-2", "position", 2) == pytest.approx([0.3, 0.2], abs=1e-5)
-    assert 0.049 < first.at("ball-2", "position", 2) < 0.05, "solved at once: it falls"
-    orders = [decode(Order, payload) for channel, payload in run.said if channel == channels.ORDER.name]
-    assert [order.tick for order in orders if order.edits] == [answer.tick]
-
-
 def busy(nodes: int) -> Run:
     """Adds, removes, pushes and moves, close to each other."""
     run = Run(nodes, ticks=260, pace=REALTIME)
@@ -165,18 +148,6 @@ def busy(nodes: int) -> Run:
     for tick in (50, 51, 130, 180) if nodes > 1 else ():
         run.ask_at(tick, "move", robot="red.midfield", node=f"n{tick % nodes + 1}")
     return run.go()
-
-
-def test_what_is_asked_gives_the_same_world_on_any_number_of_nodes() -> None:
-    alone = busy(1)
-    worlds = {tuple(present(frame)) for frame in alone.frames}
-    assert len(worlds) == 4 and all(answer.accepted for answer in alone.answers)
-    for nodes in (2, 3):
-        many = busy(nodes)
-        assert all(answer.accepted for answer in many.answers)
-        effects = [answer.text for answer in many.answers if " on n" not in answer.text and " to n" not in answer.text]
-        assert sorted(effects) == sorted(answer.text for answer in alone.answers), "at the same ticks"
-        assert many.digests == alone.digests
 
 
 def test_a_move_is_an_epoch_at_the_commit_that_its_answer_names_and_changes_nothing() -> None:

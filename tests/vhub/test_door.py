@@ -19,7 +19,7 @@ from foosim.vhub.sessions import BOOTS_KEPT
 from foosim.vhub.state.capture_queue import RecordClosing
 from foosim.vhub.state.records import HubRecord, TickRecord
 from foosim.vhub.state.resume import recall
-from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub, sent
+from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub
 
 PLAYERS: Final = apply_sets(TABLE.read_text(), TABLE.name, ("network.links=[]",))
 RED: Final = "player-red"
@@ -80,26 +80,6 @@ def hello(hub: Hub, name: str, boot: str, returns: int = 0) -> list[ClientWelcom
     hub.said()
     hub.say(channels.CLIENT_HELLO, name, ClientHello(name, boot, limits.PROTOCOL_VERSION, "", 0, returns))
     return hub.said(channels.CLIENT_WELCOME, channels.CLIENT_REFUSAL)
-
-
-def test_numbers_of_a_process_whose_answer_waits_to_be_recorded_are_taken() -> None:
-    """It has answered and died, the tick waits for another client still: who comes goes on behind its numbers."""
-    hub = Hub().begin()
-    hub.commit(0)
-    hub.done("hand", 0, sent(1), sent(2))
-    hub.core.client_gone("hand", 0)
-    (welcome,) = hello(hub, "hand", "two")
-    assert isinstance(welcome, ClientWelcome) and welcome.sequence == 2
-    hub.enter("hand", boot="two")
-    hub.done("knee", 0)
-    assert hub.state.closed == 0
-    tick = PERIODS["hand"]
-    for each in range(1, tick):
-        hub.close(each)
-    hub.commit(tick)
-    hub.done("hand", tick, sent(3), boot="two")
-    hub.done("knee", tick)
-    assert hub.state.members["hand"].sequence == 3 and hub.state.refusals == {}
 
 
 def test_what_comes_late_of_a_process_that_is_gone_is_of_nobody() -> None:
@@ -166,19 +146,6 @@ def join(hub: Hub, name: str, boot: str) -> list[ClientRefusal]:
     return hub.said(channels.CLIENT_REFUSAL)
 
 
-def test_a_player_that_is_started_again_joins_where_a_late_hello_has_its_name() -> None:
-    """The hello of a process that has ended comes behind the news of its end."""
-    hub = table()
-    hub.core.client_gone(RED, 0)
-    for boot in ("dead", "living"):
-        (welcome,) = hello(hub, RED, boot)
-        assert isinstance(welcome, ClientWelcome)
-    assert join(hub, RED, "living") == []
-    assert (hub.core.sessions.by_name[RED].boot, hub.core.waiting_for) == ("living", f"join of {BLUE}")
-    (refusal,) = join(hub, RED, "dead")
-    assert (refusal.reason, refusal.joins) == (f"a client {RED} is already here", True)
-
-
 def test_a_player_that_fails_before_it_joins_is_heard_whoever_has_its_name() -> None:
     hub = table()
     hello(hub, RED, "dead")
@@ -191,23 +158,6 @@ def test_a_player_that_fails_before_it_joins_is_heard_whoever_has_its_name() -> 
     join(hub, RED, "living")
     hub.say(channels.UP, RED, Failure(RED, "twin", "no such class"))
     assert not hub.core.lost, "another one plays"
-
-
-@pytest.mark.parametrize(
-    ("late", "living", "entries"),
-    [(("dead", 1), ("two", 0), 1), (("dead", 0), ("one", 1), 0), (("dead", 0), ("two", 0), 1), (None, ("one", 1), 0)],
-)
-def test_the_account_tells_of_the_process_that_joins(
-    late: tuple[str, int] | None, living: tuple[str, int], entries: int
-) -> None:
-    """A player was lost while the vHub was away where another process joins, whatever a late hello says."""
-    hub = restarted(playing())
-    for who in (late, living):
-        if who is not None:
-            hello(hub, RED, *who)
-    assert join(hub, RED, living[0]) == []
-    report = hub.core.clients.absences.report()
-    assert (report["away"], len(report["over"])) == ([], entries)
 
 
 @pytest.mark.parametrize(("living", "entries"), [(("one", 2), 0), (("two", 0), 1)])
@@ -224,19 +174,6 @@ def test_a_player_that_only_loses_its_connection_again_is_not_lost(
     assert join(hub, RED, living[0]) == []
     report = hub.core.clients.absences.report()
     assert (report["away"], len(report["over"])) == ([], entries)
-
-
-def test_what_comes_late_of_a_process_that_has_not_joined_is_no_answer() -> None:
-    """It may be of a dead one, whose numbers the living one would not know of."""
-    hub = restarted(playing())
-    hub.commit(5)
-    hello(hub, RED, "one", 1)
-    hello(hub, RED, "two", 0)
-    hub.done(RED, 5, sent(1))
-    assert RED in hub.core.clients.waited
-    join(hub, RED, "two")
-    hub.done(RED, 5, sent(1), boot="two")
-    assert RED not in hub.core.clients.waited
 
 
 def test_of_processes_that_come_and_go_under_one_name_the_last_are_kept() -> None:
@@ -334,14 +271,6 @@ def test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_uns
     assert told(hub, RED) == []
     hub.say(channels.RESUME_GRANT, "vhub", ResumeGrant("vhub", "boot-2", 0))
     assert told(hub, RED) == [owed]
-
-
-def test_a_player_that_comes_and_goes_while_its_tick_is_closed_without_it_is_waited_for() -> None:
-    hub, go = left_owing()
-    hub.say(channels.UP, RED, Join(RED, "two", 0, []))
-    hub.core.client_gone(RED, hub.now_ns)
-    hub.done(BLUE, 5)
-    assert hub.state.closed == 5 and told(hub, RED)[-1].number == go.number
 
 
 def _is_of_tick(action: Journal, tick: int) -> bool:

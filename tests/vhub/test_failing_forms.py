@@ -12,7 +12,6 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.deployment import loader
 from foosim.simulation.run import rehearse
 from tests.own_forms import folder_on_path
 

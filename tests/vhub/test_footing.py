@@ -10,7 +10,6 @@ from foosim.protocol.actions import Action, Journal, Publish
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import Build, ClientHello, Deliveries, Epoch, Want
-from foosim.supervisor.state import InputBuffer
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import HeadRecord, HubRecord
@@ -140,12 +139,3 @@ def test_a_commit_of_an_older_epoch_does_not_count() -> None:
     air.tick, air.epoch = CLOSED, 4
     air.close()
     assert air.closed() == CLOSED + 1
-
-
-def test_deliveries_are_taken_once() -> None:
-    inputs = InputBuffer()
-    inputs.reset(5)
-    told = Deliveries(5, [], 2)
-    assert inputs.take_deliveries(told, encode(told), 5) and inputs.delivered == 7
-    assert not inputs.take_deliveries(told, encode(told), 5)
-    assert decode(Deliveries, inputs.deliveries[7]) == Deliveries(7, [], 0)

@@ -11,6 +11,7 @@ import jsonschema
 import msgspec
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -55,8 +56,9 @@ from foosim.world.edits import Add, Edit, Push, Remove
 from foosim.world.frame import Frame
 from foosim.world.kinematics import CENTRE_OF_SLOT, forward_kinematics, twist
 from foosim.world.layout import build_layout
-from tests.forms.worlds import DEPLOY, DRIVES, SOLIDS
+from tests.forms.worlds import DEPLOY
 from tests.vhub.conftest import DOWN_FROM, DOWN_TO
+from tests.whole_worlds import assets, written, yard
 
 if TYPE_CHECKING:
     from foosim.deployment.schema import Deployment
@@ -305,14 +307,14 @@ def test_the_columns_of_a_capture_are_the_first_of_its_rows() -> None:
 
 # --- columns of frames -----------------------------------------------------------------------------------------------
 
-ARM: Final = {"model": "urdf", "file": "models/arm.urdf", "fixed": False, "at": {"x": "5 m", "z": "1 m"}, "sensors": {}}
+ARM: Final = {"model": "urdf", "file": "arm.urdf", "fixed": False, "at": {"x": "5 m", "z": "1 m"}, "sensors": {}}
 FREE_SLOTS: Final = (*CENTRE_OF_SLOT, "angular_velocity")
 
 
 def test_columns_are_of_the_origins_of_links_as_on_tf_and_in_sensors() -> None:
-    objects = DRIVES.data["objects"] | {"hull": SOLIDS.data["objects"]["hull"]}
-    world = DRIVES.with_(("objects",), objects).with_(("robots", "arm"), ARM)
-    text, files = pin_assets(world.text(), "yard.yaml", DEPLOY)
+    data = yaml.safe_load(yard())
+    data["robots"]["free-arm"] = ARM
+    text, files = pin_assets(written(data), "yard.yaml", assets())
     drives = load_deployment(text, "yard.yaml").with_assets(files)
     apart = set()
     for deployment in (drives, load_deployment((DEPLOY / "table.yaml").read_text(), "table.yaml")):
@@ -343,4 +345,4 @@ def test_columns_are_of_the_origins_of_links_as_on_tf_and_in_sensors() -> None:
                 assert [centre[index].tolist() for centre in centres] == slots
             with pytest.raises(CaptureError, match=f"{name}: position has 1 to 3 numbers, not 7"):
                 frames.column(name, "position", 7)
-    assert apart == {"arm", "hull", "one", "three", "two"}
+    assert apart == {"free-arm", "hull", "scout"}

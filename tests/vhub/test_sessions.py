@@ -26,7 +26,6 @@ from foosim.protocol.messages import (
     Down,
     End,
     Epoch,
-    Heartbeat,
     Join,
     Ready,
     Samples,
@@ -194,22 +193,6 @@ def test_no_other_client_can_make_the_run_wait_for_it(period: int) -> None:
 # --- lockstep --------------------------------------------------------------------------------------------------------
 
 
-def test_go_follows_commit_and_samples_and_the_tick_waits_for_all_dones() -> None:
-    hub = Hub().begin()
-    hub.said()
-    frame = FRAME
-    hub.say(channels.COMMIT, "vhub", Commit(1, 0, frame.digest, frame.values.tobytes(), [], [], False))
-    assert not hub.said(channels.DOWN) and hub.core.waiting_for.startswith("samples of ")
-    hub.say(channels.SAMPLES, "n1", Samples(0, frame.digest, "n1", [r.name for r in frame.layout.robots], []))
-    assert [(go.number, go.tick) for go in hub.said(channels.DOWN)] == [(1, 0), (1, 0)]
-    assert hub.core.waiting_for == "Done of hand, knee" and hub.state.closed == -1
-    hub.done("knee", 0)
-    assert not hub.said(channels.DELIVERIES) and hub.core.waiting_for == "Done of hand"
-    hub.done("hand", 0, sent(1))
-    (deliveries,) = hub.said(channels.DELIVERIES)
-    assert deliveries.tick == 1 and [packet.source for packet in deliveries.packets] == ["hand"]
-
-
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -231,17 +214,6 @@ def test_what_is_no_answer_to_this_go_is_not_taken(wrong: Done | Up) -> None:
     hub.done("hand", 0)
     (deliveries,) = hub.said(channels.DELIVERIES)
     assert deliveries.packets == [], "nothing of it counts"
-
-
-def test_a_done_that_is_said_again_counts_once() -> None:
-    hub = Hub().begin()
-    hub.commit(0)
-    hub.said()
-    hub.done("hand", 0, sent(1))
-    hub.done("hand", 0, sent(1), sent(2))
-    hub.done("knee", 0)
-    (deliveries,) = hub.said(channels.DELIVERIES)
-    assert [packet.sequence for packet in deliveries.packets] == [1] and hub.core.statistics().repeated == 1
 
 
 def test_a_go_is_said_again_with_doubling_waits_until_it_is_answered() -> None:
@@ -290,24 +262,6 @@ def test_no_deadline_passes_while_the_run_is_paused() -> None:
     assert hub.core.lost == ""
     hub.core.wake(102_000 * MS)
     assert hub.core.lost.startswith("hand has not answered tick 0 for 2 s")
-
-
-def test_a_lockstep_client_that_goes_is_lost_and_nothing_breaks() -> None:
-    for tick_waits, back_ms in ((True, 10_000), (False, 2_000)):  # of its two deadlines the longer one
-        hub = Hub().begin()
-        if tick_waits:
-            hub.commit(0)
-            hub.done("knee", 0)
-        else:
-            hub.close(0)
-        hub.core.client_gone("hand", 0)
-        hub.core.wake((back_ms - 1) * MS)
-        assert not any(beat.lost for beat in hub.said(channels.HEARTBEAT)), "it may come back"
-        hub.core.wake(back_ms * MS)
-        beat = hub.said(channels.HEARTBEAT)[-1]
-        assert isinstance(beat, Heartbeat) and beat.lost == "lost hand: its connection closed"
-        hub.core.wake(15_000 * MS)
-        assert hub.core.deadline_ns() > 15_000 * MS
 
 
 # --- free-running ----------------------------------------------------------------------------------------------------
@@ -359,21 +313,6 @@ def test_a_full_inbox_refuses_and_counts() -> None:
     assert hub.state.refusals == {"inbox_full": 40_000} and hub.state.packets.offered == 40_000
 
 
-def test_what_a_client_sent_before_it_went_is_still_judged() -> None:
-    hub = Hub().begin()
-    hub.enter("ear", wanted=["red.goal"])
-    hub.close(0)
-    hub.said()
-    hub.say(channels.UP, "ear", Up("ear", "one", [sent(1), sent(2)]))
-    hub.core.client_gone("ear", 0)
-    hub.enter("ear", boot="two")
-    hub.say(channels.UP, "ear", Up("ear", "two", [sent(2), sent(3)]))
-    hub.close(1)
-    (deliveries,) = hub.said(channels.DELIVERIES)
-    assert [packet.sequence for packet in deliveries.packets] == [1, 2, 3]
-    assert hub.state.refusals == {"duplicate": 1} and hub.state.members["ear"].active
-
-
 @pytest.mark.parametrize("comes_back", [False, True])
 def test_what_is_sent_before_the_join_is_taken_is_judged_with_it(comes_back: bool) -> None:
     """The join and the packets come while tick 5 waits for a Done: the join is taken at tick 6."""
@@ -414,30 +353,6 @@ def test_what_is_sent_without_ever_joining_is_refused() -> None:
     hub.done("hand", 0)
     hub.done("knee", 0)
     assert hub.state.closed == 0 and hub.state.refusals == {"unknown_source": 2}
-
-
-def presence(hub: Hub) -> tuple[bool, int]:
-    """Whether `ear` takes part, and how many channels it hears."""
-    member = hub.state.members["ear"]
-    return member.active, len(member.subscriptions)
-
-
-def test_a_client_that_leaves_hears_nothing_more_and_may_come_back() -> None:
-    hub = Hub().begin()
-    hub.enter("ear", wanted=["red.goal"])
-    hub.close(0)
-    hub.core.client_gone("ear", 0)
-    assert presence(hub) == (True, 1)
-    hub.close(1)
-    assert presence(hub) == (False, 0)
-    hub.said()
-    hub.enter("ear", boot="two", wanted=["red.goal"])
-    (welcome,) = hub.said(channels.CLIENT_WELCOME)
-    assert welcome.boot == "two"
-    for tick in range(2, hub.state.final + 1):
-        assert presence(hub) == (False, 0), "the deliveries behind this tick are final"
-        hub.close(tick)
-    assert presence(hub) == (True, 1) and hub.state.members["ear"].joined_tick == hub.state.closed
 
 
 def test_the_end_is_said_to_everyone_with_the_next_number() -> None:

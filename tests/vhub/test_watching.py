@@ -27,7 +27,6 @@ from foosim.protocol.messages import Heartbeat, Watched
 from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub import status
 from foosim.vhub.network.packet import DROPPED, Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.vhub.stages.explanation import Evidence
@@ -142,17 +141,6 @@ def test_the_last_drops_of_a_watched_link_are_told_as_rows() -> None:
     assert rows == dropped[at + 1 - DROPS_KEPT : at + 1] and len(dropped) - at < 20, "the last ones when it was told"
 
 
-def test_watched_links_are_told_beside_the_busiest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(status, "LINKS_REPORTED_MAX", 3)
-    state = seen().system.hub.state
-    assert state is not None and len(state.fabric.states) > 4
-    order = sorted(state.fabric.states, key=lambda key: (-state.fabric.states[key].offered, key))
-    last = order[-1]
-    for watched, expected in (([], order[:3]), ([last[:2], ("no", "body")], [*order[:3], last])):
-        lines = decode_json(bytes(status.LinkLines().lines(state, watched, anew=True)))
-        assert [(line[0], line[1], line[6]) for line in lines] == sorted(expected)
-
-
 def test_the_readings_of_a_watched_sensor_are_told_with_their_ticks() -> None:
     told = seen().watched["readings"]
     assert set(told) == {"camera/ball"}
@@ -234,14 +222,6 @@ def test_a_supervisor_that_was_started_again_knows_no_lease_and_tells_the_vhub_s
     assert not system.hub.watching.links and not system.supervisor.viewing.is_shown
 
 
-def test_a_vhub_that_has_missed_that_nobody_looks_is_told_again() -> None:
-    run = Run().at(20, "watch", links=[LINK]).at(60, "watch")
-    bus = run.system.bus
-    run.do(60, lambda: bus.cut_off(channels.VHUB, bus.now_ns + 1, output=False)).go()
-    assert [watched.links for watched in run.told] == [[LINK], [], []]
-    assert not run.system.hub.watching.links
-
-
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
@@ -292,19 +272,3 @@ def test_a_report_of_what_is_looked_at_has_a_size() -> None:
     assert {len(readings) for readings in told["watched"]["readings"].values()} == {1}, "the newest of each"
     assert told["watched"]["readings"]["rover/ranges-0"][-1][0] == 2 * READINGS_KEPT - 1
     assert len(told["watched"]["drops"]["camera>player-red"]) == DROPS_KEPT
-
-
-def test_a_page_is_told_of_drops_with_their_steps_and_of_each_reading_once() -> None:
-    run = seen()
-    console = Shown(run.system.supervisor.state.deployment)
-    reports = [status["watched"] for status in run.reports if "watched" in status]
-    messages = [console.drops(status, [LINK]) for status in reports]
-    (last,) = next(told for told in reversed(messages) if told)
-    assert (last["type"], last["link"]) == ("watched", list(LINK))
-    assert [drop["cause"] for drop in last["drops"]] == [row.cause for row, _ in drops(run, LINK)]
-    assert {"stage", "outcome", "text"} == last["drops"][0]["steps"][0].keys()
-    assert console.drops(reports[-1], [LINK]) == [], "nothing new"
-    told = [message for status in reports for message in console.readings(status)]
-    ticks = [tick for message in told for tick, _ in message["points"]]
-    assert (told[0]["robot"], told[0]["channel"]) == READING
-    assert ticks == list(range(ticks[0], ticks[-1] + 1, 5)), "each one once"

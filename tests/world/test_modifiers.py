@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.edited_frame import edit
 from foosim.node.tick import Stepper
-from foosim.simulation.run import rehearse
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
@@ -216,24 +215,6 @@ class Failing(Sensor):
             raise ValueError("no more")
         return Reading(float("nan") if self.how == "nan" and view.tick >= 50 else 1.0)
 '''
-
-
-@pytest.mark.parametrize(
-    ("how", "tick", "reason"),
-    [
-        ("raises", 50, "sensor own of red.goal failed at tick 50: ValueError: no more"),
-        ("writes", 50, "failed at tick 50: AssertionError: it writes red.goal joint_positions, neither its own slot"),
-    ],
-)
-@pytest.mark.parametrize("nodes", [1, 2])
-def test_a_component_that_raises_ends_the_run_in_order_and_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, tick: int, reason: str, nodes: int
-) -> None:
-    (tmp_path / "failing_sensor.py").write_text(FAILING)
-    monkeypatch.syspath_prepend(tmp_path)
-    own = f"robots.red.goal.sensors.own={{kind: 'failing_sensor:Failing', rate: 100 Hz, how: {how}}}"
-    done = rehearse(TEXT, TABLE.name, 100, nodes, [own, "engine=pure"]).json
-    assert done["failed"] and reason in done["reason"] and done["ticks"] <= tick
 
 
 def test_a_reading_that_is_not_finite_is_said_once_and_not_sent(

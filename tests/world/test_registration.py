@@ -112,15 +112,6 @@ def test_slots_that_do_not_follow_from_settings_are_a_problem_of_the_component(s
     )
 
 
-@pytest.mark.parametrize("slots", [slots for slots in SLOTS if "samples" not in slots])
-def test_slots_of_modifiers_are_a_problem_of_the_modifier(site: Path, slots: str) -> None:
-    refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
-    own = f"modifier('own', ModifierSettings, slots={slots.replace('settings.count', '1')})(Own)"
-    told = SLOTS[slots].replace("LINE", str(len(written(site, *refuse, own).read_text().splitlines())))
-    place = "robots.red.goal.sensors.encoder.modifiers"
-    assert problems(f"{place}=[{{kind: 'own_form:Own'}}]") == ([f"{place}[0]: {told}"] if told else [])
-
-
 def test_a_sensor_whose_slots_follow_from_its_settings_has_them(site: Path) -> None:
     written(site, "sensor('own', Settings, Number, slots=lambda settings, on: {'kept': settings.count})(Own)")
     text = apply_sets(TEXT, "t.yaml", [f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: 7}}"])
@@ -135,15 +126,6 @@ def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
     line = len((site / "own_form.py").read_text().splitlines()) - 1
     why = f"ZeroDivisionError: integer division or modulo by zero (own_form.py:{line})"
     assert problem.endswith(f"modifiers[0]: its check fails: {why}, 'own_form:Own'")
-
-
-@pytest.mark.parametrize(("bound", "said"), [("gt=0", "not above 0, 0"), ("lt=0", "not below 0, 0"),
-                                             ("multiple_of=3", "not a multiple of 3, 4")])  # fmt: skip
-def test_bounds_of_any_kind_are_said_in_foosims_words(site: Path, bound: str, said: str) -> None:
-    own = ("class Bounded(SensorSettings):", f"    count: Annotated[int, Field({bound})]", "")
-    written(site, *own, "sensor('own', Bounded, Number)(Own)")
-    count = said.rpartition(" ")[2]
-    assert problems(f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: {count}}}") == [f"{PLACE}.count: {said}"]
 
 
 # --- models ----------------------------------------------------------------------------------------------------------
@@ -174,19 +156,6 @@ def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
     assert plain is model and (rigid.name, rigid.is_rigid) == ("own", True)
     assert [*plain.fields_of(None, None)] == ["x", "down", "refused", "clamped"]
     assert [*rigid.fields_of(None, None)] == ["y", "down", "refused", "clamped", "quarantined"]
-
-
-def test_foosims_own_models_keep_the_places_of_their_fields() -> None:
-    """Digests of layouts, and captures, have them."""
-    assert [*find_model("rod").fields_of(None, None)] == [
-        *("joint_positions", "joint_velocities", "joint_efforts", "quarantined", "down", "contacts", "refused"),
-        *("unmoved", "clamped"),
-    ]
-    assert (
-        [*find_model("station").fields_of(None, None)]
-        == [*find_model("camera").fields_of(None, None)]
-        == ["down", "refused", "clamped"]
-    )
 
 
 # --- modules that cannot be imported ---------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
-from math import nan, pi
+from math import nan
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,14 +30,6 @@ from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
-ACTUATORS = [
-    *("force", "joint_position", "joint_torque", "joint_velocity"),
-    *("rod_force", "rod_position", "rod_velocity", "rod_voltage", "rotor_speeds", "wheel_speeds"),
-]
-SENSORS: Final = [
-    *("ball", "ball_state", "battery", "contact", "encoder", "figure_contact", "gps", "imu", "joint_state"),
-    *("motor_current", "odometry", "pose", "pose_3d", "proximity"),
-]
 
 GAUGES: Final = '''
 from typing import Annotated
@@ -421,27 +413,6 @@ def test_the_schema_for_editors_has_what_is_installed(site: Path) -> None:
         assert not is_valid(own, setting), setting
 
 
-def test_the_schema_has_components_without_settings_of_their_own(site: Path) -> None:
-    """Those whose settings are what all sensors have."""
-    install(site, "own", "own_tellers")
-    told = "robots.red.goal.sensors.own={kind: teller, rate: 100 Hz"
-    schema = validator(installed=True)
-    assert is_valid(schema, "seed=2")
-    assert is_valid(schema, f"{told}}}") and not is_valid(schema, f"{told}, scale: 2.0}}")
-
-
-def test_the_schema_keeps_settings_of_one_name_apart(site: Path) -> None:
-    """A package may call its settings as foosim does."""
-    (site / "own_poses.py").write_text(GAUGES.replace('"reach"', '"pose2"').replace("ReachSettings", "PoseSettings"))
-    pose = find("sensor", "pose").settings.__name__
-    assert pose == "PoseSettings"
-    before = deployment_schema()["$defs"][pose]
-    install(site, "own", "own_poses")
-    schema = validator(installed=True)
-    assert is_valid(schema, "robots.red.goal.sensors.own={kind: pose2, rate: 100 Hz, scale: 2.0}")
-    assert before in deployment_schema(installed=True)["$defs"].values(), "foosim's own is still there"
-
-
 def validator(*, installed: bool) -> Draft202012Validator:
     """Of the JSON Schema, which is one."""
     schema = deployment_schema(installed=installed)
@@ -518,22 +489,6 @@ def test_readings_of_a_sensor_of_ones_own_reach_a_player_and_the_capture(tmp_pat
     assert len(values) == 12 and [value.tick for value in values] == [float(tick) for tick in range(0, 60, 5)]
     assert '""slide"":' in (tmp_path / "packets.csv").read_text(), "a table has them by name"
     assert rehearsed(REACH, WINCH_OF_GOAL, hears, nodes=3)[0].digests == done.digests, "law 1"
-
-
-@pytest.mark.usefixtures("site")
-def test_an_actuator_of_ones_own_takes_commands_and_moves_its_robot(tmp_path: Path) -> None:
-    sets = (WINCH_OF_GOAL, listens({"red.goal": ["encoder"]}, {"red.goal": 15.0}))
-    _, frames = rehearsed(*sets, nodes=2, capture=tmp_path / "run.mcap")
-    last = frames[60]
-    assert last.at("red.goal", "turn.rate") == 15.0 and last.at("red.goal", "turn.taken") >= 4.0
-    assert "position.set_point" not in last.layout["red.goal"].offsets
-    assert last.at("red.goal", "refused") == 0.0
-    turned = [frames[tick].at("red.goal", "joint_velocities", 1) for tick in range(55, 61)]
-    assert turned == pytest.approx([15.0] * 6)
-    assert 0.1 < last.at("red.goal", "joint_positions", 1) < 2 * pi
-    export_capture(tmp_path / "run.mcap", "commands", tmp_path / "commands.csv")
-    head, line, *_ = (tmp_path / "commands.csv").read_text().splitlines()
-    assert "rate" in head.split(",") and "15.0" in line.split(",")
 
 
 @pytest.mark.usefixtures("site")

@@ -1,11 +1,13 @@
-"""What cannot work of other packages' forms is a problem of the deployment that names them, at its place, in a line."""
+"""Components of other packages that cannot work: a problem of the deployment that names them, at its place, in a line.
+
+What one does at any later tick ends the run by an error with its name, its entity, the tick and its line.
+"""
 
 from __future__ import annotations
 
 import re
 import sys
 from collections.abc import Iterator
-from importlib import invalidate_caches
 from pathlib import Path
 from typing import Final
 
@@ -13,12 +15,17 @@ import pytest
 
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import read_deployment
+from foosim.simulation.check.component_check import ComponentCheck
 from foosim.simulation.run import rehearse
+from foosim.simulation.settings import Settings
+from tests.conftest import Typed
 from tests.forms.worlds import HALL, ROVERS, World
+from tests.own_forms import folder_on_path
 
 NAME: Final = "own.yaml"
 GOOD: Final = """
 from msgspec import Struct
+from foosim import Player
 from foosim.world.components.entities import RuleMounting
 from foosim.world.forms.quantities import Metres
 from foosim.world.components.base import Actuator, EntityRule, Model, Modifier, Motion, Rule, Sensor
@@ -143,6 +150,11 @@ class Counts(Rule):
         return f"{status['ticks']:.0f} ticks"
 
 
+class Drives(Player):
+    def act(self, tick, samples):
+        return {"mover": {"speed": 0.5}}
+
+
 @scene("pillar", SceneSettings)
 def pillar(settings):
     return (Shape(Box((0.1, 0.1, 1.0)), "", GREY, (3.0, -2.0, 1.0), name="pillar"),)
@@ -157,20 +169,21 @@ def own_world() -> World:
     world = world.with_(("robots", "mover", "rules"), {"wears": {"kind": "own_forms:Wears"}}, ())
     world = world.with_(("robots", ROVERS[0], "sensors", "places"), SENSOR, ())
     world = world.with_(("scene",), {"kind": "own_forms:pillar"}, ())
+    own = {"class": "own_forms:Drives", "rate": "50 Hz", "lockstep": True, "robots": {"mover": []}}
+    world = world.with_(("players", "own"), own, ())
     return world.with_(("rules",), {"counts": {"kind": "own_forms:Counts"}}, ())
 
 
 def planted(folder: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> None:
     (folder / "own_forms.py").write_text(source)
-    monkeypatch.syspath_prepend(str(folder))
+    folder_on_path(folder, monkeypatch)
     sys.modules.pop("own_forms", None)
-    invalidate_caches()
 
 
 def test_what_works_is_valid_and_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     planted(tmp_path, monkeypatch, GOOD)
     done = rehearse(own_world().text(), NAME, 50, 2)
-    assert not done.json["failed"] and done.json["ticks"] == 50
+    assert not done.json["failed"] and done.json["ticks"] == 50 and done.json["failed_form"] is None
 
 
 PLACES: Final = {
@@ -280,3 +293,107 @@ def refused(folder: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> list[
     lines = str(error.value).splitlines()
     assert all(line.startswith(f"{NAME}:") and "Traceback" not in line for line in lines)
     return lines
+
+
+# --- in a run --------------------------------------------------------------------------------------------------------
+
+TICK: Final = 10
+MISDEEDS: Final = {
+    "1 / 0": "ZeroDivisionError: ",
+    "raise SystemExit(0)": "SystemExit: 0",
+    "return 3.0": "returned 3.0; expected ",
+    "return [3.0]": "returned [3.0]; expected ",
+}
+AT_TICKS: Final = {
+    ("Slides", "move"): "motion",
+    ("Speed", "accept"): "actuator speed of mover",
+    ("Speed", "command"): "actuator speed of mover",
+    ("Places", "sample"): "sensor places of ",
+    ("Halves", "apply"): "modifier halves of places of ",
+    ("Wears", "apply"): "rule wears of mover",
+    ("Counts", "apply"): "rule counts of the world",
+}
+"""Methods that are called at ticks, and what their error names. Those of rules and motions return nothing."""
+NOTHING: Final = ("Slides", "Wears", "Counts")
+
+
+def misdeed(component: str, method: str, line: str) -> tuple[str, int]:
+    """Return the source with a line that a method begins with from a tick on, and its number."""
+    lines = GOOD.splitlines()
+    begin = next(n for n, one in enumerate(lines) if one.startswith(f"class {component}("))
+    at = next(n for n in range(begin, len(lines)) if f"def {method}(" in lines[n]) + 1
+    lines[at:at] = [f"        if view.tick >= {TICK}:", f"            {line}"]
+    return "\n".join(lines), at + 2
+
+
+@pytest.mark.parametrize("line", MISDEEDS)
+@pytest.mark.parametrize(("component", "method"), AT_TICKS)
+def test_a_misdeed_at_any_tick_ends_the_run_with_its_name_its_tick_and_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, component: str, method: str, line: str
+) -> None:
+    if line.startswith("return") and component in NOTHING:
+        return
+    source, number = misdeed(component, method, line)
+    planted(tmp_path, monkeypatch, source)
+    logged: list[str] = []
+    settings = Settings(on_log=lambda process, level, text: logged.append(text) if process == "supervisor" else None)
+    done = rehearse(own_world().text(), NAME, 30, 2, settings=settings).json
+    name, form = AT_TICKS[component, method], done["failed_form"]
+    found = re.search(rf"{name}.* failed at tick (\d+): .*{re.escape(MISDEEDS[line])}", done["reason"])
+    assert done["failed"] and found is not None and TICK <= int(found[1]) == form["tick"] <= TICK + 5, done["reason"]
+    assert any(form["traceback"] in text for text in logged)
+    if not line.startswith("return"):
+        assert f"(own_forms.py:{number})" in done["reason"] and form["traceback"].startswith("Traceback")
+
+
+@pytest.mark.parametrize(("component", "method"), [key for key in AT_TICKS if key[0] != "Slides"])
+def test_a_direct_write_to_the_frame_is_found_by_the_check_of_components(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, component: str, method: str
+) -> None:
+    source, number = misdeed(component, method, "view.numbers[0] = 0.125")
+    planted(tmp_path, monkeypatch, source)
+    check = ComponentCheck(own_world().text(), NAME, 20)
+    (line,) = check.broken()
+    assert check.has_failed and AT_TICKS[component, method] in line
+    assert f"TypeError: numbers of a frame are written by view.write alone (own_forms.py:{number})" in line
+
+
+def test_an_interrupt_is_no_misdeed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    planted(tmp_path, monkeypatch, misdeed("Places", "sample", "raise KeyboardInterrupt")[0])
+    with pytest.raises(KeyboardInterrupt):
+        rehearse(own_world().text(), NAME, 30, 1)
+
+
+ARRAY: Final = "expected an array of float64 of the shape (2, 2)"
+
+
+@pytest.mark.parametrize(
+    ("made", "said"), [("np.zeros((2, 1))", ARRAY), ("[[1.0, 2.0]] * 2", ARRAY), ("exit(0)", "SystemExit: 0")]
+)
+def test_sensors_that_measure_together_give_an_array(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: str, said: str
+) -> None:
+    together = f"""
+class Batch:
+    def sample(self, view):
+        return {made}
+
+
+Places.together = staticmethod(lambda sensors: Batch())
+"""
+    lines = refused(tmp_path, monkeypatch, f"import numpy as np\n{GOOD}{together}")
+    assert any(said in line and "sensor places of" in line for line in lines), lines
+
+
+@pytest.mark.parametrize(("command", "tick"), [("check", 0), ("components check", 0), ("rehearse", 10)])
+def test_no_command_is_done_where_a_component_leaves(
+    tmp_path: Path, typed: Typed, monkeypatch: pytest.MonkeyPatch, command: str, tick: int
+) -> None:
+    """`sys.exit(0)` in a sensor: at the trial of a deployment, and in a run."""
+    source, number = misdeed("Places", "sample", "raise SystemExit(0)")
+    planted(tmp_path, monkeypatch, source.replace(f">= {TICK}", f">= {tick}"))
+    (tmp_path / NAME).write_text(own_world().text())
+    words = {"check": [], "components check": ["places", "--in"], "rehearse": ["--for", "500ms"]}[command]
+    done = typed(*command.split())(*words, str(tmp_path / NAME))
+    assert done.code == (1 if tick else 2), done
+    assert f"failed at tick {tick or 1}: SystemExit: 0 (own_forms.py:{number})" in done.out + done.err
