@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import msgspec
 
@@ -34,7 +34,6 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.parts import END_METADATA, METADATA, NEXT, files_from, head_of, part_path, parts_at
-from foosim.capture.reader import About, Scan, deployment_of
 from foosim.capture.rows import (
     EPOCHS,
     FORMAT,
@@ -57,6 +56,10 @@ from foosim.protocol.messages import Epoch
 from foosim.runtime.disk import Room, room_on_disk, size_like
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import RobotPacket
+
+if TYPE_CHECKING:
+    from foosim.capture.reader import About
+
 
 Entry = tuple[str, int, int, int, Row]
 """A row with its place: topic, log time and publish time (simulated ns), sequence number."""
@@ -465,6 +468,8 @@ class CaptureFile:
 
         Return the metadata of its end, the bytes after its last whole chunk, and the damage, empty without any.
         """
+        from foosim.capture.reader import Scan  # slow, and only joined files are read
+
         scan, last, damage = Scan(path), dict[str, bytes](), ""
         try:
             for message in scan.messages():
@@ -493,6 +498,8 @@ class CaptureFile:
 
 def described_as(about: About, own: Mapping[str, str]) -> Described:
     """Return the description of a capture for another file of its rows, with the `own` metadata of that."""
+    from foosim.capture.reader import deployment_of  # slow, and only copies of captures need it
+
     metadata = {**{key: value for key, value in about.metadata.items() if key not in OWN}, **own}
     return Described(deployment_of(about), about.deployment_name, about.deployment_text, metadata, about.versions)
 

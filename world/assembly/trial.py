@@ -31,6 +31,7 @@ from foosim.world.fixed_scenery import scene_shapes
 from foosim.world.forms.failures import failure_of
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Layout, build_layout
+from foosim.world.scenery import SceneryMesh
 from foosim.world.spec import WorldSpec
 
 TICK: Final = 1
@@ -74,7 +75,9 @@ def _try_tick(spec: WorldSpec, layout: Layout) -> None:
         called(f"scene {spec.scene.kind}", "", 0, scene_shapes, spec)
     for name, section in sorted(spec.kits.items()):
         called(f"kit {name}", "", 0, _try_kit, spec.kit_types[name].factory, section, spec)
-    build_scene(spec, layout)
+    meshes = [name for name, thing in spec.scenery.items() if isinstance(thing, SceneryMesh)]
+    if all(spec.mesh_of(name) is not None for name in meshes):  # their files come after the text
+        build_scene(spec, layout)
     world = World(spec, layout, is_guarded=True)
     start = initial_numbers(spec, layout, world.models, is_guarded=True)
     sensors = [sensor for robot in layout.robots for sensor in sensors_of(spec, layout, robot)]
