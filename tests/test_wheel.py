@@ -147,7 +147,7 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
     program += "for name in sys.argv[1:]: assert get(name).__file__.startswith(sys.prefix), get(name)"
     run(installed.commands / "python", "-I", "-W", "error", "-c", program, *modules, cwd=tmp_path)
     assert len(list(installed.packages.glob("foosim/**/py.typed"))) == len(PACKAGES)
-    learning = installed.packages / "foosim" / "players" / "learning"
+    learning = installed.packages / "foosim" / "library" / "table" / "learning"
     assert (learning / "table.yaml").read_text() == (ROOT / "deploy" / "table.yaml").read_text()
     scripts = re.findall(r"^(foosim[\w-]*) = ", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     assert "foosim" in scripts

@@ -63,7 +63,7 @@ def _counted(planting: Planting) -> None:
 
 @register("supervisor does not ask again", "who has had no progress asks again (supervisor)", 2)
 def _patient(planting: Planting) -> None:
-    planting.swap(SupervisorCore, "_ask_again", lambda self, now_ns: self._retry.requested(now_ns))
+    planting.swap(SupervisorCore, "_request_missing", lambda self, now_ns: self._retry.requested(now_ns))
 
 
 @register("supervisor does not answer who asks", "supervisor and vHub keep the last 16 ticks", 1)

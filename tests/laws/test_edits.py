@@ -255,7 +255,7 @@ REQUESTS: Final[tuple[tuple[int, str, dict[str, Any]], ...]] = (
 REFUSED: Final = (
     ("b-3", "at", "0,0,0.2", "at of b-3: a place that is occupied: b-3 would be in b-1, "),
     ("k-1", "at", "3,-2", "would be in k-2"),
-    ("k-1", "at", {"roll": "3 deg"}, "an upright entity has no roll"),
+    ("k-1", "at", {"roll": "3 deg"}, "an upright body has no roll"),
     ("k-1", "at", "3", "valid are X,Y or X,Y,Z"),
     (
         "k-1",
@@ -352,7 +352,7 @@ def test_a_robot_that_is_added_on_a_node_stays_there_when_its_own_is_back() -> N
         ({"at": "1 s", "set": {"down": True}}, "either `entity` or `choose`"),
         ({"at": "1 s", "entity": "k-9", "add": True}, "events[0].entity: no entity matches"),
         ({"at": "1 s", "entity": "k-3", "add": "3"}, "valid are X,Y or X,Y,Z"),
-        ({"at": "1 s", "entity": "k-3", "add": {"roll": "3 deg"}}, "an upright entity has no roll"),
+        ({"at": "1 s", "entity": "k-3", "add": {"roll": "3 deg"}}, "an upright body has no roll"),
         ({"at": "1 s", "entity": "k-3", "add": True, "remove": True}, "an event does one thing"),
         ({"at": "1 s", "entity": "k-3"}, "an event does one thing"),
         ({"at": "1 s", "entity": "k-3", "remove": False}, "events[0].remove"),

@@ -271,7 +271,7 @@ def test_with_feelers_it_goes_round_what_is_in_its_way(model: str) -> None:
     [
         ({"sensors": {"jobs": {"kind": "job", "actuator": "og", "rate": "1 Hz"}}}, "there are go, 'og'"),
         ({"actuators": {"go": {"kind": "x_y_w"}}}, "no such actuator with jobs; there are none"),
-        ({"model": "rotorcraft"}, "it moves robots on two wheels, and those of the model holonomic"),
+        ({"model": "rotorcraft"}, "valid are robots on two wheels and of the model holonomic"),
         ({"model": "station", "x": "0 m", "y": "0 m"}, "go_to"),
     ],
 )
