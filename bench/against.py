@@ -36,10 +36,10 @@ RUNS: Final = 5
 OF_TICKS: Final = """
 import gc, sys, time
 from pathlib import Path
-try:
-    from foosim.simulation.run import rehearse
-    from foosim.simulation.settings import Settings
-except ModuleNotFoundError:  # an earlier commit
+try:  # an earlier commit
+    from foosim.rehearsal.run import rehearse
+    from foosim.rehearsal.settings import Settings
+except ModuleNotFoundError:
     from foosim.simulation.run import rehearse
     from foosim.simulation.settings import Settings
 file, ticks, seeds, runs, skipped = Path(sys.argv[1]), *map(int, sys.argv[2:])
@@ -124,7 +124,8 @@ def tick_s(tree: Path, world: str) -> float:
     file = tree / "deploy" / f"{world}.yaml"
     if world == "rigid fleet":
         file = tree.parent / f"{tree.name}-fleet.yaml"
-        file.write_text(bodies.fleet_text("mujoco" if (tree / "node" / "engines" / "mujoco.py").exists() else "bullet"))
+        has_mujoco = (tree / "node" / "physics" / "mujoco_islands.py").exists()
+        file.write_text(bodies.fleet_text("mujoco" if has_mujoco else "bullet"))
     numbers = [str(number) for number in (TICKS[world], SEEDS, RUNS, START_TICKS)]
     return float(run_in(tree, [sys.executable, "-c", OF_TICKS, str(file), *numbers]))
 
