@@ -1,12 +1,10 @@
-"""What a battery of a robot is like: its settings, and the numbers of the battery that a robot has.
+"""The battery of a robot: its settings, the rule that drains and charges it, and the sensor of its charge and voltage.
 
-The battery of a robot: the costs of idling and moving, and the power of chargers. Empty, it stops the drives.
+An empty battery stops the drives.
 
 In a tick of dt the charge falls by idle power x dt + drag x way, and rises by power x dt for each charger within whose
 radius the robot is, between 0 and the capacity. The way of a rover is that of its wheels, of any other robot the
 distance between its places at the tick's start and end; a robot with a fixed base covers none.
-
-A robot's battery: its charge and its voltage.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Two joints that turn a camera or a head: one to the sides, and one that hangs on it up and down.
+"""Pan and tilt of a camera or a head: a joint to the sides, and on it a joint up and down.
 
-A camera or a head by its two angles. A job is done when it looks there.
+A job is done when both angles are within tolerance.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The ball of a football table: a solid sphere that nothing holds.
-
-Position of the ball as an overhead camera's tracker gives it.
-"""
+"""The ball of a football table, a free solid sphere, and the sensor of its position, as of an overhead camera."""
 
 from __future__ import annotations
 

@@ -53,4 +53,4 @@ def check_present(layout: Layout, numbers: Sequence[float], name: str) -> None:
 
 
 def _always(name: str) -> str:
-    return f"{name} is always in the world: fixed entities, and entities of a kit neither come nor go"
+    return f"{name} is always in the world: fixed entities and entities of a kit neither come nor go"
