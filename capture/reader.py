@@ -393,28 +393,20 @@ class FrameReader:
         return row
 
 
-def origin_of(about: About) -> Origin | None:
-    """Return where the run of a capture began, None: at frame 0. Raises CaptureError."""
-    about_it = about.metadata
-    if ORIGIN_TICK not in about_it:
-        return None
-    try:
-        digest, chain = bytes.fromhex(about_it[ORIGIN_DIGEST]), bytes.fromhex(about_it[ORIGIN_CHAIN])
-        return Origin(int(about_it[ORIGIN_TICK]), about_it[ORIGIN], digest, chain)
-    except (KeyError, ValueError) as error:
-        raise CaptureError(f"{about.path}: its record of where its run began is incomplete: {error}") from None
-
-
 def beginning_of(about: About) -> Origin | None:
     """Return where a capture begins, a cut or its run, None: at frame 0. Raises CaptureError."""
-    entries = about.metadata
+    entries, what = about.metadata, "it was cut"
+    source, tick, digest, chain = CUT, CUT_TICK, CUT_DIGEST, CUT_CHAIN
     if CUT not in entries:
-        return origin_of(about)
+        what = "its run began"
+        source, tick, digest, chain = ORIGIN, ORIGIN_TICK, ORIGIN_DIGEST, ORIGIN_CHAIN
+        if ORIGIN_TICK not in entries:
+            return None
     try:
-        digest, chain = bytes.fromhex(entries[CUT_DIGEST]), bytes.fromhex(entries[CUT_CHAIN])
-        return Origin(int(entries[CUT_TICK]), entries[CUT], digest, chain)
+        digests = bytes.fromhex(entries[digest]), bytes.fromhex(entries[chain])
+        return Origin(int(entries[tick]), entries[source], *digests)
     except (KeyError, ValueError) as error:
-        raise CaptureError(f"{about.path}: its record of where it was cut is incomplete: {error}") from None
+        raise CaptureError(f"{about.path}: its record of where {what} is incomplete: {error}") from None
 
 
 def chain_at_start(about: About) -> bytes:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Final, Literal, get_args
 
+from foosim.capture.left import Progress
 from foosim.protocol.codec import decode_any
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import HeadRecord, HubRecord
-from foosim.vhub.state.resume import Captured, Past, recall
+from foosim.vhub.state.resume import Past, recall
 
 Ending = Literal["now", "torn", "unpublished"]
 """When a vHub dies: at once; during its next write, which leaves a torn record; after it, before publishing."""
@@ -20,8 +21,7 @@ class HubJournal:
 
     def __init__(self) -> None:
         self.records: list[bytes] = []
-        self.captured_tick = -1
-        self.captured_epoch = 0
+        self.captured = Progress()
         self.machine = "machine-1"
         """The machine that holds the journal; another one after a machine loss."""
         self.ending: Ending | None = None
@@ -41,5 +41,4 @@ class HubJournal:
     def past(self, hub: HubCore, run: str) -> Past | None:
         """Return the records that a new vHub resumes from; None for the first vHub."""
         assert hub.deployment is not None
-        captured = Captured(self.captured_tick, self.captured_epoch)
-        return recall(hub.deployment, run, self.records, captured, hub.deployment.deadlines.client_back_ns)
+        return recall(hub.deployment, run, self.records, self.captured, hub.deployment.deadlines.client_back_ns)

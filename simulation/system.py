@@ -23,6 +23,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.messages import Epoch
 from foosim.runtime.roles.bus import Bus, Message
 from foosim.simulation.failures import Stuck
 from foosim.simulation.journals import Ending, HubJournal
@@ -30,8 +31,8 @@ from foosim.simulation.people import OPERATOR, People
 from foosim.simulation.settings import AtWork, Clock, Process, Settings, Traced
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
-from foosim.vhub.core import ClosingCore, HubCore
-from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
+from foosim.vhub.core import HubCore
+from foosim.vhub.state.records import Closing
 from foosim.world.frame import Frame
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
@@ -315,7 +316,7 @@ class System:
                 self.bus.put(process.name, farewell.channel, farewell.name, farewell.payload, at_ns)
                 self.leave(process.name)
 
-        process.core, process.turn = ClosingCore(hub), turn
+        hub.is_closing, process.turn = True, turn
         turn(begun_ns)
 
     def leave(self, name: str) -> None:
@@ -341,14 +342,14 @@ class System:
                 self.journal.append(action.record)
             if settings.on_journal is not None:
                 settings.on_journal(process.name, action.record)
-        elif isinstance(action, RecordClosing):
-            self.hub_journal.captured_tick = max(self.hub_journal.captured_tick, action.closing.frame.tick)
+        elif isinstance(action, Closing):
+            self.hub_journal.captured.tick = max(self.hub_journal.captured.tick, action.frame.tick)
             if settings.on_closing is not None:
-                settings.on_closing(action.closing)
-        elif isinstance(action, RecordEpoch):
-            self.hub_journal.captured_epoch = action.epoch.epoch
+                settings.on_closing(action)
+        elif isinstance(action, Epoch):
+            self.hub_journal.captured.epoch = action.epoch
             if settings.on_epoch is not None:
-                settings.on_epoch(action.epoch)
+                settings.on_epoch(action)
         elif isinstance(action, Log) and settings.on_log is not None:
             settings.on_log(process.name, action.level, action.text)
 

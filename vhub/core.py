@@ -11,12 +11,11 @@ What nodes wait for leaves first, so a closing has steps: between them the shell
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
-
-from msgspec.structs import replace
 
 from foosim.common import limits
 from foosim.common.errors import Malformed, Refused
@@ -62,10 +61,17 @@ from foosim.vhub.clients import Clients, lost
 from foosim.vhub.network.packet import Flight, received
 from foosim.vhub.paced_release import Releases
 from foosim.vhub.sessions import Sessions
-from foosim.vhub.state.capture_queue import CaptureQueue, RecordClosing, RecordEpoch, last_closings
 from foosim.vhub.state.commits import Commits
 from foosim.vhub.state.hub_state import HubState
-from foosim.vhub.state.records import Closing, HeadRecord, closing_of, missing_robots, tick_record, world_packets
+from foosim.vhub.state.records import (
+    Closing,
+    HeadRecord,
+    closing_of,
+    last_closings,
+    missing_robots,
+    tick_record,
+    world_packets,
+)
 from foosim.vhub.state.resume import Past
 from foosim.vhub.status import HubStatistics, LinkLines, ShellStatus, report, statistics
 from foosim.vhub.wait_times import WaitTimes
@@ -74,7 +80,8 @@ from foosim.world.assembly.initial_state import first_chain
 from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
 
-HubAction = Action | RecordClosing | RecordEpoch
+HubAction = Action | Closing | Epoch
+"""The shell records a closing, or an epoch that begins, in the capture."""
 
 
 class _Step(Enum):
@@ -152,6 +159,8 @@ class HubCore:
         self.releases: Releases | None = None
         self.ended: End | None = None
         self.finished = False
+        self.is_closing = False
+        """Whether the run has ended and the capture accepts no more records: only heartbeats follow, with its state."""
         self.lost = self.failure = self.capture_file = ""
         self.shell = ShellStatus()
         self.link_lines, self.watching = LinkLines(), WatchList()
@@ -159,7 +168,8 @@ class HubCore:
         self.epoch = self._epoch_tick = self._end_ns = self._malformed = self._repeated = 0
         self.epoch_payload = b""
         self._owners: dict[str, str] = {}
-        self._keeping = CaptureQueue()
+        self._unrecorded: deque[Closing] = deque()
+        """Closings with packets that clients have not been sent yet, and all later ones, oldest first."""
         self.commits = Commits()
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
@@ -189,7 +199,9 @@ class HubCore:
     # --- what the shell calls --------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message; a malformed or misplaced one is counted and dropped."""
+        """Take one message; a malformed or misplaced one is counted and dropped, and any once the capture is closed."""
+        if self.is_closing:
+            return
         try:
             if channel is channels.REFUSAL:
                 self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
@@ -248,6 +260,8 @@ class HubCore:
     def wake(self, now_ns: int) -> None:
         """Do what is due by time: hello, heartbeat, repeated requests, releases, deadlines, the end."""
         self.member.wake(now_ns, self.heartbeat)
+        if self.is_closing:
+            return
         self.clients.wake(now_ns, holds=self.orphan.is_alone or self.handshake.waits)
         if self.state is not None and self.epoch > 0:
             self.sessions.acknowledge(self.state, now_ns)
@@ -260,6 +274,8 @@ class HubCore:
     def deadline_ns(self) -> int:
         """When `wake` has something to do next."""
         deadline = self.member.deadline_ns
+        if self.is_closing:
+            return deadline
         if self.epoch > 0 and not self.finished:
             deadline = min(deadline, self._retry.at_ns, limits.COUNTER_MAX if self.ended is None else self._end_ns)
         if self.releases is not None and self.releases.deadline_ns is not None:
@@ -304,6 +320,8 @@ class HubCore:
     @property
     def waiting_for(self) -> str:
         """What the closing of the current tick waits for, for people and for the supervisor."""
+        if self.is_closing:
+            return CAPTURE
         if self.state is None:
             return "start"
         if self.handshake.waits:
@@ -409,8 +427,8 @@ class HubCore:
         if self.watching.links:
             self.watching.judged(world.closing.fates)
         world.closing.ages = state.aged
-        self._keeping.add(world.closing)
-        self.actions += self._keeping.take(releases.waiting_tick)
+        self._unrecorded.append(world.closing)
+        self._record(releases)
         self._world = None
         if (tick + 1) % limits.CHECKPOINT_TICKS == 0:
             self.actions.append(Journal(self.head()))
@@ -455,7 +473,13 @@ class HubCore:
             what = release.number, release.tick, member.sequence, received(release.flights)
             down = Down(*what, False, release.since, [*release.absent])
             self.sessions.send_down(release.client, down, now_ns)
-        self.actions += self._keeping.take(self.releases.waiting_tick)
+        self._record(self.releases)
+
+    def _record(self, releases: Releases) -> None:
+        """Have the closings recorded, in the order of their ticks, whose packets have their times of release."""
+        waiting, closings = releases.waiting_tick, self._unrecorded
+        while closings and (waiting is None or closings[0].frame.tick < waiting):
+            self.actions.append(closings.popleft())
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
@@ -531,7 +555,7 @@ class HubCore:
             self.failure = f"the run is at tick {epoch.tick}: the journal of the vHub that brought it there is not here"
             return
         self._take_epoch(epoch)
-        self.actions += [Journal(self.epoch_payload), RecordEpoch(epoch)]
+        self.actions += [Journal(self.epoch_payload), epoch]
         self._enter()
         if first:
             tick = self.state.closed + 1
@@ -690,7 +714,7 @@ class HubCore:
         self.finished = True
         self._release(now_ns)
         half = None if self._world is None else self._world.closing  # a tick that is half closed has fates
-        self.actions += map(RecordClosing, last_closings(self.state, self.commits, self.ended.tick, half, now_ns))
+        self.actions += last_closings(self.state, self.commits, self.ended.tick, half, now_ns)
         for name in self.sessions.by_name:
             member = self.state.members.get(name)
             number = 1 if member is None else member.downlink + 1
@@ -699,25 +723,3 @@ class HubCore:
     def farewell(self) -> Publish:
         """Return the hub's last message, once the shell has closed the capture."""
         return Publish(channels.FAREWELL, channels.VHUB, encode(Farewell(channels.VHUB, self._report(is_last=True))))
-
-
-class ClosingCore:
-    """Sends the heartbeat of a vHub that closes its capture. `actions` is what the shell performs next."""
-
-    def __init__(self, core: HubCore) -> None:
-        self.actions: list[Any] = core.actions
-        self._core = core
-
-    def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Drop a message: the run has ended."""
-
-    def wake(self, now_ns: int) -> None:
-        """Send the heartbeat when it is due; its report has the state of the capture."""
-        self._core.member.wake(now_ns, self._heartbeat)
-
-    def deadline_ns(self) -> int:
-        """When `wake` has something to do next."""
-        return self._core.member.deadline_ns
-
-    def _heartbeat(self) -> Heartbeat:
-        return replace(self._core.heartbeat(), waiting_for=CAPTURE)

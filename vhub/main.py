@@ -19,6 +19,7 @@ import typer
 from msgspec.structs import replace
 
 from foosim.capture.contents import check_new, ending_metadata, origin_metadata
+from foosim.capture.left import Progress
 from foosim.capture.parts import first_there
 from foosim.common import limits, wall_clock
 from foosim.common.addresses import LOOPBACK, Address, check_listen
@@ -30,7 +31,7 @@ from foosim.protocol.actions import Log, Publish
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.messages import CAPTURE, Build
+from foosim.protocol.messages import CAPTURE, Build, Epoch
 from foosim.runtime.command import DONE, FAILED, REFUSED, PkiOption, new_app
 from foosim.runtime.disk import Level
 from foosim.runtime.health import ProgressOption
@@ -51,15 +52,14 @@ from foosim.runtime.transport.certificates import (
 )
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
-from foosim.vhub.core import ClosingCore, HubCore
+from foosim.vhub.core import HubCore
 from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
 from foosim.vhub.network.custom_models import check_link_models
 from foosim.vhub.recording.disk_watch import RoomWatch
 from foosim.vhub.recording.recorder import Recorder
-from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
-from foosim.vhub.state.records import first_head
-from foosim.vhub.state.resume import Captured, first_tick_of, last_tick_of, recall, was_captured
+from foosim.vhub.state.records import Closing, first_head
+from foosim.vhub.state.resume import first_tick_of, last_tick_of, recall, was_captured
 from foosim.world.components.view import ComponentError
 
 SWITCH_S = 0.0001
@@ -104,8 +104,6 @@ class HubShell:
         self._capture: Recorder | None = None
         self._room: RoomWatch | None = None
         self._forget_ns = self._look_ns = 0
-        self._is_closing = False
-        """Whether the run has ended, and the capture accepts no more records."""
         self._why_abandoned = ""
         """Why this vHub leaves before its run ends."""
         self._shell = RoleShell(process, VHUB, self.core, lambda now_ns: self.core.deadline_ns(), credentials)
@@ -178,11 +176,10 @@ class HubShell:
         capture, ended = self._capture, self.core.ended
         if capture is None:
             return True
-        if not self._is_closing:
+        if not self.core.is_closing:
             assert ended is not None
             self.role.perform()
-            self._is_closing, closing = True, ClosingCore(self.core)
-            self.role.core, self.role.deadline_ns = closing, lambda now_ns: closing.deadline_ns()
+            self.core.is_closing = True
             capture.on_end = self._inbox.wake
             capture.begin_finish({**ending_metadata(ended), "ended": wall_clock.now_text()})
         return capture.has_ended
@@ -295,7 +292,7 @@ class HubShell:
         what = f"{damaged}; tick {last_tick_of(records)} is the last before it"
         return Refused(f"{what}. {branch_command([build.deployment_name], capture)}")
 
-    def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Captured | None:
+    def _open_capture(self, build: Build, deployment: Deployment, records: list[bytes]) -> Progress | None:
         """Begin the capture, or resume that of the process before; return how far it is."""
         before, options = was_captured(records), self._options
         if not (options.keeps if before is None else before):
@@ -317,7 +314,7 @@ class HubShell:
         described = build.deployment_name, build.deployment, metadata, self._log_text
         self._capture = Recorder(path, deployment, *described, first_tick_of(deployment, records))
         self._capture.while_waiting = self._wait_for_capture
-        return self._capture.captured
+        return self._capture.begun_with
 
     def _listen(self, deployment: Deployment) -> None:
         """Open the radio plane to the clients that the deployment declares."""
@@ -341,12 +338,12 @@ class HubShell:
             kept = min(kept, self._capture.synced_tick)
         journal.forget_before(kept)
 
-    def _keep(self, action: RecordClosing | RecordEpoch) -> None:
+    def _keep(self, action: Closing | Epoch) -> None:
         if self._capture is not None:
-            self._write(self._capture.keep, action.closing if isinstance(action, RecordClosing) else action.epoch)
+            self._write(self._capture.keep, action)
 
     def _on_log(self, log: Log) -> None:
-        if self._capture is not None and not self._is_closing:
+        if self._capture is not None and not self.core.is_closing:
             self._write(self._capture.log, log.level, log.text, self.core.statistics().closed + 1)
 
     def _write(self, put: Callable[..., None], *arguments: Any) -> None:

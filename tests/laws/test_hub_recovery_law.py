@@ -25,7 +25,7 @@ from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
 from foosim.vhub.core import HubCore
-from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
+from foosim.vhub.recording.rows_of_closing import packet_entry, world_rows
 from foosim.vhub.state.records import Closing
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -71,9 +71,9 @@ class Seen:
         """The rows of all closings in their order, without the wall's time and who was lost."""
         rows: list[Any] = []
         known = None
-        plan = plan_of(DEPLOYMENT)
         for closing in self.closings:
-            for topic, at_ns, _, number, row in (*world_rows(closing, plan, known), *map(packet_entry, closing.fates)):
+            entries = *world_rows(closing, DEPLOYMENT, known), *map(packet_entry, closing.fates)
+            for topic, at_ns, _, number, row in entries:
                 fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
                 if topic != RECOVERIES:
                     rows.append((topic, at_ns, number, fields))

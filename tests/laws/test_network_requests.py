@@ -18,7 +18,7 @@ from foosim.simulation.journals import ENDINGS, Ending
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
-from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
+from foosim.vhub.recording.rows_of_closing import packet_entry, world_rows
 from foosim.vhub.state.records import Closing
 from foosim.world.edits import Disrupt
 
@@ -28,7 +28,7 @@ SETS: Final = (
     *("engine=pure", "table.rules.kickoff_delay=20 ms"),
     "network.links=[{id: lan, between: ['*', '*'], delay: 1 ms, jitter: {shape: gamma, sd: 2 ms}, loss: 2 %}]",
 )
-PLAN: Final = plan_of(load_deployment(TABLE.read_text(), TABLE.name))
+DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 EVENTS: Final[Sequence[tuple[int, dict[str, Any]]]] = (
     (20, {"partition": [["player-red"], ["rest"]], "for": "20 ms"}),
     (40, {"clog": {"from": "camera", "to": "player-*"}}),
@@ -57,7 +57,8 @@ def rows_in(closings: Sequence[Closing]) -> list[Any]:
     rows: list[Any] = []
     known = None
     for closing in closings:
-        for topic, at_ns, _, number, row in (*world_rows(closing, PLAN, known), *map(packet_entry, closing.fates)):
+        entries = *world_rows(closing, DEPLOYMENT, known), *map(packet_entry, closing.fates)
+        for topic, at_ns, _, number, row in entries:
             fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
             if topic not in (RECOVERIES, EPOCHS):
                 rows.append((topic, at_ns, number, fields))

@@ -43,7 +43,6 @@ from foosim.protocol.messages import (
 )
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.recorder import Recorder
-from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import Add, Edit, Push, Remove, write
@@ -142,10 +141,10 @@ class Driver:
                 self.run.journal.append(action.record)
                 if not self.run.records or isinstance(decode_any(HubRecord, action.record), TickRecord):
                     self.run.records.append(action.record)
-            elif isinstance(action, RecordClosing):
-                self.run.closings.append(action.closing)
-            elif isinstance(action, RecordEpoch):
-                self.run.epochs.append(action.epoch)
+            elif isinstance(action, Closing):
+                self.run.closings.append(action)
+            elif isinstance(action, Epoch):
+                self.run.epochs.append(action)
             elif isinstance(action, Publish) and action.channel is channels.DELIVERIES:
                 deliveries = decode(Deliveries, action.payload)
                 self.run.deliveries.setdefault(deliveries.tick, []).append(action.payload)

@@ -30,7 +30,6 @@ from foosim.runtime.journal import Journal, JournalError
 from foosim.vhub.recording import recovery
 from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import UNCLEAN, Recovered, recover_capture, recovered_path
-from foosim.vhub.state.capture_queue import RecordClosing
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.vhub.state.resume import first_tick_of, recall
 from tests.vhub.conftest import BY_TIME, EPOCH_AT, METADATA, NAME, with_sets
@@ -124,13 +123,13 @@ def resume(path: Path, run: HubRun, records: Sequence[bytes]) -> None:
     described = run.deployment, NAME, run.text, METADATA
     writer = Recorder(path, *described, None, first_tick_of(run.deployment, records))
     if had is not None:
-        assert writer.captured.tick <= max(had.ticks.tolist(), default=-1)  # a chunk without its indexes comes again
-    past = recall(run.deployment, "run-1", records, writer.captured, 0)
+        assert writer.begun_with.tick <= max(had.ticks.tolist(), default=-1)  # a chunk without its indexes comes again
+    past = recall(run.deployment, "run-1", records, writer.begun_with, 0)
     assert past is not None
     if past.known is not None:
         writer.keep(past.known)
     for item in past.kept:
-        writer.keep(item.closing if isinstance(item, RecordClosing) else item.epoch)
+        writer.keep(item)
     known = 0 if past.epoch is None else past.epoch.epoch
     for epoch in run.epochs:
         if epoch.epoch > known:
@@ -246,8 +245,8 @@ def test_a_run_that_ends_where_its_journal_does_loses_nothing(chunked: bytes, hu
     before, records = rows(file), journal_until(hub_run, 20)
     described = hub_run.deployment, NAME, hub_run.text, METADATA
     writer = Recorder(file, *described, None, first_tick_of(hub_run.deployment, records))
-    past = recall(hub_run.deployment, "run-1", records, writer.captured, 0)
-    assert past is not None and not past.kept and past.state.closed == 20 < writer.captured.tick
+    past = recall(hub_run.deployment, "run-1", records, writer.begun_with, 0)
+    assert past is not None and not past.kept and past.state.closed == 20 < writer.begun_with.tick
     assert past.committed is not None
     end = Closing(past.committed[2], past.committed[2].digest, [], [], fates=past.state.in_flight())
     for _ in range(2):

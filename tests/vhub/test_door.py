@@ -16,8 +16,7 @@ from foosim.protocol.hub_messages import ResumeGrant
 from foosim.protocol.messages import ClientHello, ClientRefusal, ClientWelcome, Down, Epoch, Failure, Go, Join, Tempo
 from foosim.vhub.core import HubCore
 from foosim.vhub.sessions import BOOTS_KEPT
-from foosim.vhub.state.capture_queue import RecordClosing
-from foosim.vhub.state.records import HubRecord, TickRecord
+from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.vhub.state.resume import recall
 from tests.vhub.test_sessions import BUILD, FRAME, MS, OWNERS, PERIODS, TABLE, Hub
 
@@ -64,14 +63,14 @@ def test_a_client_leaves_once_however_often_it_comes_and_goes() -> None:
     hub.core.client_gone("ear", 0)
     for tick in range(1, 5):
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
+    left = [action.leaves for action in hub.core.actions if isinstance(action, Closing)]
     assert [leaves for leaves in left if leaves] == [["ear"]]
     for tick in range(5, 15):
         if hub.state.hears_clients:
             hub.enter("ear", boot=f"at {tick}")
             hub.core.client_gone("ear", 0)
         hub.close(tick)
-    left = [action.closing.leaves for action in hub.core.actions if isinstance(action, RecordClosing)]
+    left = [action.leaves for action in hub.core.actions if isinstance(action, Closing)]
     assert [leaves for leaves in left if leaves] == [["ear"]], "who has left cannot leave"
 
 

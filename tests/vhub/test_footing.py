@@ -11,14 +11,13 @@ from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import Build, ClientHello, Deliveries, Epoch, Want
 from foosim.vhub.core import HubCore
-from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
-from foosim.vhub.state.records import HeadRecord, HubRecord
+from foosim.vhub.state.records import Closing, HeadRecord, HubRecord
 from foosim.vhub.state.resume import recall
 from tests.client.test_core import DEPLOYMENT, NAME, TEXT
 from tests.client.test_return import Storm
 
 CLOSED: Final = 7
-Said = list[Action | RecordClosing | RecordEpoch]
+Said = list[Action | Closing | Epoch]
 
 
 class Waiting(Storm):

@@ -11,7 +11,6 @@ from foosim.protocol.messages import Commit, End, Tempo, Up
 from foosim.vhub.main import needs_record
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.paced_release import Release, Releases
-from foosim.vhub.state.capture_queue import RecordClosing
 from foosim.vhub.state.records import Closing
 from tests.vhub.test_sessions import FRAME, MS, Hub, sent
 
@@ -62,7 +61,7 @@ class Kept:
 
     def take(self) -> None:
         actions = [*self.hub.core.actions]
-        self.kept += [action.closing for action in actions if isinstance(action, RecordClosing)]
+        self.kept += [action for action in actions if isinstance(action, Closing)]
         self.journaled += sum(isinstance(action, Journal) for action in actions)
         for down in self.hub.said(channels.DOWN):
             self.left += [(packet.sequence, self.hub.now_ns) for packet in down.packets]
@@ -98,13 +97,13 @@ def test_at_the_end_what_waits_leaves_and_all_closings_are_kept() -> None:
 
 def ended_amid(hub: Hub, tick: int) -> list[Closing]:
     """What the capture gets of a run that ends at `tick` while the vHub waits for something before it."""
-    kept = [action.closing for action in hub.core.actions if isinstance(action, RecordClosing)]
+    kept = [action for action in hub.core.actions if isinstance(action, Closing)]
     hub.core.actions.clear()
     hub.say(channels.END, "supervisor", End(tick, "lost the journal", True))
     hub.now_ns += limits.DOWNLINK_KEPT_NS
     hub.core.wake(hub.now_ns)
     assert hub.core.finished
-    return kept + [action.closing for action in hub.core.actions if isinstance(action, RecordClosing)]
+    return kept + [action for action in hub.core.actions if isinstance(action, Closing)]
 
 
 def test_frames_behind_a_tick_that_is_half_closed_are_kept() -> None:

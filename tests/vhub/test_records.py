@@ -11,20 +11,21 @@ import msgspec
 import pytest
 
 from foosim.capture.file import Entry
+from foosim.capture.left import Progress
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.messages import Deliveries, Down
+from foosim.protocol.messages import Deliveries, Down, Epoch
 from foosim.runtime.journal import Journal, journal_files, read_journal, read_records
-from foosim.vhub.recording.rows_of_closing import Plan, packet_entry, plan_of, world_rows
-from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
+from foosim.vhub.recording.rows_of_closing import packet_entry, world_rows
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, InputsRecord, TickRecord, fold
-from foosim.vhub.state.resume import Captured, recall
+from foosim.vhub.state.resume import recall
 from foosim.world.frame import CHAIN_START, Frame, chain_next
 from tests.vhub.conftest import EPOCH_AT
 
 if TYPE_CHECKING:
+    from foosim.deployment.schema import Deployment
     from tests.vhub.conftest import HubRun
 
 
@@ -39,8 +40,8 @@ def head_of(run: HubRun, tick: int) -> bytes:
     return encode(HeadRecord("run-1", run.snapshots[tick], record.commit, epoch, chain=chain))
 
 
-def rows_of(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
-    return [*world_rows(closing, plan, known), *map(packet_entry, closing.fates)]
+def rows_of(closing: Closing, deployment: Deployment, known: Frame | None) -> list[Entry]:
+    return [*world_rows(closing, deployment, known), *map(packet_entry, closing.fates)]
 
 
 def without_wall(row: msgspec.Struct) -> dict[str, object]:
@@ -62,7 +63,6 @@ def test_the_run_has_everything_in_it(hub_run: HubRun) -> None:
 
 
 def test_a_fold_gives_the_hub_at_every_record(hub_run: HubRun) -> None:
-    plan = plan_of(hub_run.deployment)
     known = None
     count = 0
     for tick, (state, closing) in enumerate(fold(hub_run.deployment, hub_run.records)):
@@ -73,7 +73,7 @@ def test_a_fold_gives_the_hub_at_every_record(hub_run: HubRun) -> None:
         assert decode(Deliveries, record.deliveries).packets == state.deliveries[tick + 1]
         assert hub_run.deliveries.get(tick + 1, []) == ([] if state.was_final else [record.deliveries])
         assert closing.frame.digest == closing.digest == live.digest
-        folded, kept = rows_of(closing, plan, known), rows_of(live, plan, known)
+        folded, kept = (rows_of(one, hub_run.deployment, known) for one in (closing, live))
         assert [entry[:4] for entry in folded] == [entry[:4] for entry in kept]
         assert [without_wall(entry[4]) for entry in folded] == [without_wall(entry[4]) for entry in kept]
         known = closing.frame
@@ -133,7 +133,7 @@ def test_records_that_are_no_run_are_refused(hub_run: HubRun) -> None:
 
 @pytest.mark.parametrize("captured", [None, -1, 3, 28, 40, 63])
 def test_a_vhub_that_is_started_again_knows_what_the_one_before_knew(hub_run: HubRun, captured: int | None) -> None:
-    told = None if captured is None else Captured(captured, 1 if captured >= 0 else 0)
+    told = None if captured is None else Progress(captured, epoch=1 if captured >= 0 else -1)
     past = recall(hub_run.deployment, "run-1", hub_run.journal, told, limits.DOWNLINK_KEPT_NS)
     assert past is not None and past.state.snapshot() == hub_run.snapshots[-1]
     assert past.epoch == hub_run.epochs[-1] and past.committed is not None and past.committed[1].tick == 63
@@ -143,14 +143,14 @@ def test_a_vhub_that_is_started_again_knows_what_the_one_before_knew(hub_run: Hu
     live = {(name, down.number, encode(down)) for name, down in hub_run.downs if isinstance(down, Down)}
     again = {(name, number, payload) for name, downs in past.downlinks.items() for number, payload in downs}
     assert again and again <= live | {item for item in again if item[0] != "watcher"}
-    kept = [item.closing.frame.tick for item in past.kept if isinstance(item, RecordClosing)]
+    kept = [item.frame.tick for item in past.kept if isinstance(item, Closing)]
     assert kept == ([] if captured is None else list(range(captured + 1, 64)))
-    epochs = [item.epoch.epoch for item in past.kept if isinstance(item, RecordEpoch)]
+    epochs = [item.epoch for item in past.kept if isinstance(item, Epoch)]
     assert epochs == ([] if captured is None else [2] if captured >= 0 else [1, 2])
     if captured is not None:
-        begun = (at for at, item in enumerate(past.kept) if isinstance(item, RecordEpoch) and item.epoch.epoch == 2)
+        begun = (at for at, item in enumerate(past.kept) if isinstance(item, Epoch) and item.epoch == 2)
         second = next(begun)
-        before = sum(isinstance(item, RecordClosing) for item in past.kept[:second])
+        before = sum(isinstance(item, Closing) for item in past.kept[:second])
         assert before == max(0, EPOCH_AT - captured - 1), "it holds from its tick on"
     if captured is not None and captured >= 0:
         assert past.known is not None and past.known.frame.tick == captured
@@ -169,5 +169,5 @@ def test_the_journal_of_another_run_is_refused_and_one_behind_its_capture_is_not
         recall(hub_run.deployment, "run-2", hub_run.journal, None, 0)
     with pytest.raises(Malformed, match="one that does not start with its head, this is run run-1"):
         recall(hub_run.deployment, "run-1", hub_run.journal[1:], None, 0)
-    past = recall(hub_run.deployment, "run-1", hub_run.journal, Captured(64, 2), 0)
+    past = recall(hub_run.deployment, "run-1", hub_run.journal, Progress(64, epoch=2), 0)
     assert past is not None and past.known is None and not past.kept, "a capture that is further lacks nothing"

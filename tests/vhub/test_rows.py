@@ -48,7 +48,6 @@ from foosim.vhub.recording.rows_of_closing import (
     edit_row,
     packet_entry,
     packet_row,
-    plan_of,
     world_rows,
 )
 from foosim.world.assembly.world import build_scene
@@ -68,14 +67,13 @@ if TYPE_CHECKING:
 @pytest.fixture(scope="module")
 def entries(hub_run: HubRun) -> list[Entry]:
     """All rows of the run, in the order in which a writer writes them."""
-    plan = plan_of(hub_run.deployment)
     known: Frame | None = None
     made: list[Entry] = []
     for epoch in hub_run.epochs:
-        at_ns = epoch.tick * plan.tick_ns
+        at_ns = epoch.tick * hub_run.deployment.tick_ns
         made.append(("/epochs", at_ns, at_ns, epoch.tick, epoch_row(epoch)))
     for closing in hub_run.closings:
-        made += [*world_rows(closing, plan, known), *map(packet_entry, closing.fates)]
+        made += [*world_rows(closing, hub_run.deployment, known), *map(packet_entry, closing.fates)]
         known = closing.frame
     return made
 
@@ -116,7 +114,7 @@ def test_a_run_that_ends_within_a_tick_has_the_fates_of_the_half_that_was_closed
 
 def test_a_frame_that_is_known_brings_its_packets_alone(hub_run: HubRun) -> None:
     last = hub_run.closings[-1]
-    rest = world_rows(last, plan_of(hub_run.deployment), last.frame)
+    rest = world_rows(last, hub_run.deployment, last.frame)
     assert last.fates and {topic for topic, *_ in rest} == {AGES}, "and ages at use since the last second"
 
 

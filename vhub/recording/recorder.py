@@ -12,9 +12,8 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Epoch
 from foosim.vhub.network.custom_models import model_versions
 from foosim.vhub.recording.model_hash import MODEL_HASH, model_hash
-from foosim.vhub.recording.rows_of_closing import plan_of, tick_of
+from foosim.vhub.recording.rows_of_closing import tick_of
 from foosim.vhub.state.records import Closing
-from foosim.vhub.state.resume import Captured
 from foosim.world.assembly.used_forms import foreign_versions
 
 
@@ -31,17 +30,12 @@ class Recorder(CaptureWriter):
         say: Callable[[str, str], None] | None = None,
         journal_tick: int | None = None,
     ) -> None:
-        self._plan = plan_of(deployment)
+        self._deployment = deployment
         versions = library_versions() | model_versions(deployment.network) | foreign_versions(deployment)
         metadata = {MODEL_HASH: model_hash(deployment), **metadata}
         described = Described(deployment, deployment_name, deployment_text, metadata, versions)
         super().__init__(path, described, say, journal_tick)
 
-    @property
-    def captured(self) -> Captured:
-        """How far the resumed capture was."""
-        return Captured(self.begun_with.tick, max(0, self.begun_with.epoch))
-
     def keep(self, item: Closing | Epoch) -> None:
         """Queue a closing, or an epoch that begins; wait while the queue is full."""
-        self.put(tick_of(item, self._plan) if isinstance(item, Closing) else item)
+        self.put(tick_of(item, self._deployment) if isinstance(item, Closing) else item)

@@ -33,7 +33,7 @@ from foosim.protocol.messages import Epoch
 from foosim.runtime.disk import room_on_disk, size_like
 from foosim.runtime.journal import JournalError, journal_files, lock_journal, read_journal
 from foosim.vhub.network.packet import IN_FLIGHT
-from foosim.vhub.recording.rows_of_closing import plan_of, tick_of
+from foosim.vhub.recording.rows_of_closing import tick_of
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, fold
 
@@ -137,7 +137,7 @@ class _Completion:
     def __init__(self, deployment: Deployment, run: str, records: Iterable[bytes]) -> None:
         self.problem = ""
         self.first_tick = limits.COUNTER_MAX
-        self._deployment, self._plan = deployment, plan_of(deployment)
+        self._deployment = deployment
         self._records = iter(records)
         self._head = b""
         try:
@@ -159,7 +159,7 @@ class _Completion:
         last: tuple[HubState, Closing] | None = None
         try:
             for last in fold(self._deployment, self._folded(file)):
-                file.write(tick_of(last[1], self._plan))
+                file.write(tick_of(last[1], self._deployment))
                 file.end_large_chunk()
         except (Malformed, JournalError) as error:
             self.problem = f"its journal cannot be used to its end: {error}"
@@ -170,7 +170,7 @@ class _Completion:
                 flight.cause = IN_FLIGHT
             ages = state.ages.unreported(state.closed)
             end = Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages)
-            file.write(tick_of(end, self._plan))
+            file.write(tick_of(end, self._deployment))
 
     def _folded(self, file: CaptureFile) -> Iterator[bytes]:
         """Yield the records, and write the epochs among them that the file lacks."""

@@ -6,7 +6,6 @@ All rows are pure functions of closings, so missing ones can be made again by a 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 from msgspec.structs import replace
@@ -51,38 +50,25 @@ from foosim.world.edits import Add, Disrupt, Edit, Push, Remove
 from foosim.world.frame import Frame
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """The deployment's settings for rows."""
-
-    tick_ns: int
-    frames_every: int
-
-
-def plan_of(deployment: Deployment) -> Plan:
-    """Return the plan of a deployment's captures."""
-    return Plan(deployment.tick_ns, deployment.capture.frames_every)
-
-
-def world_rows(closing: Closing, plan: Plan, known: Frame | None) -> list[Entry]:
+def world_rows(closing: Closing, deployment: Deployment, known: Frame | None) -> list[Entry]:
     """Return the rows of one closing except packets (`packet_entry`), which are written after them.
 
     `known` is the frame of the closing before, None at the start. The last closing of a run may bring a frame that is
     known already: then its packets alone are new.
     """
-    frame = closing.frame
-    at_ns = frame.tick * plan.tick_ns
+    frame, tick_ns = closing.frame, deployment.tick_ns
+    at_ns = frame.tick * tick_ns
     mark = frame.tick & 0xFFFF_FFFF
     entries: list[Entry] = []
     if known is None or known.tick != frame.tick:
         if known is None:
             entries.append((LAYOUT, at_ns, at_ns, mark, layout_row(frame)))
         entries += [(CLIENTS, at_ns, at_ns, mark, row) for row in _client_rows(closing)]
-        entries += [_recovery_entry(entry, plan) for entry in closing.recovered]
+        entries += [_recovery_entry(entry, tick_ns) for entry in closing.recovered]
         entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
-        if known is None or frame.tick % plan.frames_every == 0:
+        if known is None or frame.tick % deployment.capture.frames_every == 0:
             entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
-    return [*entries, *(_age_entry(age, plan.tick_ns) for age in closing.ages)]
+    return [*entries, *(_age_entry(age, tick_ns) for age in closing.ages)]
 
 
 def _age_entry(age: Age, tick_ns: int) -> Entry:
@@ -106,11 +92,11 @@ def add_packets(mcap: McapWriter, channel: int, flights: list[Flight], encode: C
         mcap.add_message(channel, log_ns, publish_ns, sequence, encode(row))
 
 
-def tick_of(closing: Closing, plan: Plan) -> Tick:
+def tick_of(closing: Closing, deployment: Deployment) -> Tick:
     """Return what a capture takes of a closing; its rows are made in the thread that writes them."""
 
     def rows(known: Frame | None) -> list[Entry]:
-        return world_rows(closing, plan, known)
+        return world_rows(closing, deployment, known)
 
     def packets(mcap: McapWriter, channel: int, encode: Callable[[Row], bytes]) -> None:
         add_packets(mcap, channel, closing.fates, encode)
@@ -243,9 +229,9 @@ def _tick_row(closing: Closing) -> TickRow:
     )
 
 
-def _recovery_entry(entry: Recovered, plan: Plan) -> Entry:
+def _recovery_entry(entry: Recovered, tick_ns: int) -> Entry:
     """Return the row of a loss or return, at the last tick before it."""
-    at_ns = entry.tick * plan.tick_ns
+    at_ns = entry.tick * tick_ns
     row = RecoveryRow(entry.what, entry.name, entry.reason, entry.tick, entry.epoch, entry.outage_ns)
     return RECOVERIES, at_ns, at_ns, entry.tick & 0xFFFF_FFFF, row
 

@@ -9,6 +9,7 @@ through this class gives the state again, byte for byte.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 from operator import attrgetter
 
 import msgspec
@@ -27,7 +28,6 @@ from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FU
 from foosim.vhub.state.byte_limits import InFlightLimit, ReceiveBudget
 from foosim.vhub.state.existence import Existence
 from foosim.vhub.state.members import Here, Member
-from foosim.vhub.state.send_order import SendOrder
 from foosim.world.edits import Disrupt, Edit
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import Delivered, RobotPacket
@@ -67,8 +67,10 @@ class HubState:
         """The rows of ages at use by the last closing."""
         self._flights: dict[int, list[Flight]] = {}
         """Packets in flight, by the tick of their arrival."""
-        self._sendings = SendOrder()
-        """Packets that clients have sent at the last closed tick."""
+        self._fates: list[list[Flight]] = []
+        """Drops of each packet that clients sent at the last closed tick, in that order; then arrivals at robots."""
+        self._deferred: list[tuple[list[Flight], list[Flight]]] = []
+        """Packets of these that are not judged yet: the flights to their receivers, and the list for their drops."""
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
@@ -174,12 +176,18 @@ class HubState:
         return deliveries
 
     def close_robots(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]]) -> Deliveries:
-        """The part of phase two that robots wait for: return the deliveries of the next tick; `close_rest` follows."""
+        """The part of phase two that robots wait for: return the deliveries of the next tick; `close_rest` follows.
+
+        Packets to robots are judged first, since nodes wait for these; the costly verdicts of a broadcast by radio to
+        clients are computed while the nodes solve. No verdict changes by that: a packet is judged first only on a link
+        that shares nothing with any other (`Link.is_apart`), and where a link to a robot does share something all
+        packets are judged in their order.
+        """
         tick = frame.tick
         self.counted_rejections, self.rejected_on_receipt = sorted(self.rejected_on_receipt.items()), {}
         for cause, count in self.counted_rejections:
             self.refuse(cause, count)
-        sendings = self._sendings = SendOrder()
+        self._fates, self._deferred = [], []
         has_radios = self.fabric.profiles.on_radio
         shares = has_radios and any(not self._is_apart(flight) for flight in self._flights.get(tick + 1, ()))
         for source in sorted(admitted, key=lambda name: (self.fabric.phase_ns(name), name)):
@@ -197,17 +205,21 @@ class HubState:
                 to_robot = has_radios and sent.destination in self._robots
                 is_apart = to_robot and self._is_apart(flights[0])
                 shares = shares or (to_robot and not is_apart)
+                dropped: list[Flight] = []
+                self._fates.append(dropped)
                 if is_apart or not has_radios:
-                    self._send(flights, tick, sendings.dropped)
+                    self._send(flights, tick, dropped)
                 else:
-                    sendings.defer(flights)
+                    self._deferred.append((flights, dropped))
             if self._sequence_of(source) > before and not self.members[source].period:
                 self.ages.used(source, tick)
         if shares:
             self._send_waiting(tick)
         self.closed = tick
         self.aged = self.ages.take(tick)
-        deliveries = self._arrive_at_robots(tick + 1, sendings.arrived)
+        arrived: list[Flight] = []
+        self._fates.append(arrived)
+        deliveries = self._arrive_at_robots(tick + 1, arrived)
         self.deliveries = {tick: self.deliveries[tick], tick + 1: deliveries}
         self.was_final = tick < self.final
         if self.was_final:
@@ -221,11 +233,12 @@ class HubState:
     def close_rest(self) -> list[Flight]:
         """Judge the packets that `close_robots` has deferred; return all whose fate phase two has made final."""
         self._send_waiting(self.closed)
-        return self._sendings.fates()
+        return [*chain.from_iterable(self._fates)]
 
     def _send_waiting(self, tick: int) -> None:
         """Judge the packets of a tick that are deferred."""
-        for flights, dropped in self._sendings.take_waiting():
+        deferred, self._deferred = self._deferred, []
+        for flights, dropped in deferred:
             self._send(flights, tick, dropped)
 
     def _is_apart(self, flight: Flight) -> bool:
@@ -256,7 +269,7 @@ class HubState:
         members = [member for member in self.members.values() if member.active]
         if self._here.is_called_at_any_tick or any(member.period == 0 for member in members):
             return 0
-        if self._is_clogged(tick) or (self._here.on_arrival and any(map(self._here.calls, self._sendings.waiting))):
+        if self._is_clogged(tick) or (self._here.on_arrival and self._calls_by_deferred()):
             return 0
         if are_answered(self.deliveries[tick]) or are_answered(self.deliveries[tick + 1]):
             return 0
@@ -269,6 +282,10 @@ class HubState:
             if any(flight.destination in self._robots for flight in self._flights.get(arrival, ())):
                 return following
         return limits.RELEASE_AHEAD
+
+    def _calls_by_deferred(self) -> bool:
+        """Whether a deferred packet makes a client act at its arrival."""
+        return any(self._here.calls(flight) for flights, _ in self._deferred for flight in flights)
 
     def _is_clogged(self, tick: int) -> bool:
         """Whether a clog, which may end at any tick, delays a packet to a robot or to a client that acts at arrival."""

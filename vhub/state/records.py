@@ -19,7 +19,8 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Build, Commit, Epoch, Recovered, Samples, Sent
 from foosim.vhub.network.memory import Age, Joining
-from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.packet import IN_FLIGHT, Flight, flight_of, state_of
+from foosim.vhub.state.commits import Commits, Committed
 from foosim.vhub.state.hub_state import HubState
 from foosim.world.assembly.initial_state import first_chain
 from foosim.world.edits import Edit
@@ -135,6 +136,37 @@ def closing_of(
     delivered = state.deliveries.get(frame.tick - 1, [])
     what = wall_ns, commit.recovered, chain
     return Closing(frame, commit.digest, commit.edits, delivered, joins, leaves, [], *what)
+
+
+def last_closings(
+    state: HubState, commits: Commits, end_tick: int, half_closed: Closing | None, now_ns: int
+) -> list[Closing]:
+    """Return the last closings of a run: the tick that is half closed, with its fates, and all committed frames after
+    it, up to `end_tick`; the last one has the packets in flight.
+
+    Nodes run ahead of closings as far as deliveries allow, so there may be many. Open ticks have no fates.
+    """
+    closings = [] if half_closed is None else [half_closed]
+    for tick in range(state.closed + len(closings) + 1, end_tick + 1):
+        committed = commits.get(tick)
+        if committed is None:
+            break
+        closings.append(_unjudged(state, commits, committed, now_ns))
+    closed = commits.get(state.closed)
+    if not closings and closed is not None:
+        closings.append(_unjudged(state, commits, closed, now_ns))
+    for closing in closings[-1:]:
+        closing.ages = state.ages.unreported(state.closed)
+        for flight in state.in_flight():
+            left = flight_of(state_of(flight))
+            left.cause = IN_FLIGHT
+            closing.fates.append(left)
+    return closings
+
+
+def _unjudged(state: HubState, commits: Commits, committed: Committed, now_ns: int) -> Closing:
+    _, commit, frame = committed
+    return closing_of(frame, commit, commits.chain_at(frame.tick), state, [], [], now_ns)
 
 
 def tick_record(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from foosim.capture.left import Progress
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.deployment.schema import Deployment
@@ -17,7 +18,6 @@ from foosim.protocol.actions import Action, Log
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Commit, Deliveries, Down, Epoch
 from foosim.vhub.network.packet import received
-from foosim.vhub.state.capture_queue import RecordClosing, RecordEpoch
 from foosim.vhub.state.commits import Committed
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import (
@@ -33,14 +33,6 @@ from foosim.vhub.state.records import (
 )
 from foosim.world.frame import CHAIN_START, Frame, frame_from_bytes
 from foosim.world.layout import Layout
-
-
-@dataclass(frozen=True, slots=True)
-class Captured:
-    """Last tick and last epoch of a capture; -1 and 0 when it has none yet."""
-
-    tick: int = -1
-    epoch: int = 0
 
 
 @dataclass(slots=True)
@@ -67,19 +59,19 @@ class Past:
     """Clients that left at the last tick, owing its Done."""
     known: Closing | None = None
     """The last frame in the capture, with digest and chain."""
-    kept: list[RecordClosing | RecordEpoch] = field(default_factory=list)
+    kept: list[Closing | Epoch] = field(default_factory=list)
     """Closings and epochs that the capture lacks, in order."""
 
-    def actions(self) -> list[Action | RecordClosing | RecordEpoch]:
+    def actions(self) -> list[Action | Closing | Epoch]:
         """Return the first actions: complete the capture, log the position."""
-        actions: list[Action | RecordClosing | RecordEpoch] = [*self.kept]
+        actions: list[Action | Closing | Epoch] = [*self.kept]
         if self.epoch is not None:
             actions.append(Log("info", f"resumes after tick {self.state.closed} in epoch {self.epoch.epoch}"))
         return actions
 
 
 def recall(
-    deployment: Deployment, run: str, records: Sequence[bytes], captured: Captured | None, kept_ns: int
+    deployment: Deployment, run: str, records: Sequence[bytes], captured: Progress | None, kept_ns: int
 ) -> Past | None:
     """Return the past that a journal records; None without any tick.
 
@@ -120,18 +112,16 @@ def recall(
     return past
 
 
-def _not_captured(
-    found: Iterable[object], closings: Mapping[int, Closing], epoch: int
-) -> Iterator[RecordClosing | RecordEpoch]:
+def _not_captured(found: Iterable[object], closings: Mapping[int, Closing], epoch: int) -> Iterator[Closing | Epoch]:
     """Yield closings by tick, each followed by the epochs that begin after it, in the order of the journal."""
     for record in found:
         if isinstance(record, Epoch) and record.epoch > epoch:
-            yield RecordEpoch(record)
+            yield record
         elif isinstance(record, TickRecord) and record.tick in closings:
-            yield RecordClosing(closings[record.tick])
+            yield closings[record.tick]
 
 
-def _start(found: Sequence[object], captured: Captured | None, kept_ticks: int) -> int:
+def _start(found: Sequence[object], captured: Progress | None, kept_ticks: int) -> int:
     """Return the index of the last head before all wanted ticks; that of the first head where there is none."""
     closed = max((record.tick for record in found if isinstance(record, TickRecord)), default=-1)
     wanted = closed - kept_ticks if captured is None else min(closed - kept_ticks, captured.tick)
