@@ -1,8 +1,7 @@
-"""Nothing is lost without a cause, and the first stage that drops names it (T24); more signal is never less (T25)."""
+"""Of the stages that would drop a packet the first names the cause (T24); more signal is never less (T25)."""
 
 from __future__ import annotations
 
-from collections import Counter
 from itertools import pairwise
 from typing import Any, Final
 
@@ -10,88 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.protocol.messages import Sent
 from foosim.vhub.network.packet import Flight
-from foosim.world.robot_packets import RobotPacket
-from tests.links.offered import ENDS, MS, Hub, deployment_of, every, fabric_of, fates, rule
+from tests.links.offered import MS, every, fabric_of, fates
 from tests.links.proof import Proof
-
-# --- conservation ----------------------------------------------------------------------------------------------------
-
-IMPAIRMENTS: Final = (
-    "loss: 30 %",
-    "outages: {mean_on: 20 ms, mean_off: 10 ms}",
-    "gilbert_elliott: {p: 20 %, r: 40 %}",
-    "jitter: {shape: gamma, sd: 9 ms}",
-    "duplicate: 40 %",
-    "rate: 60 kbit/s, queue: {packets: 3}",
-    "corrupt: {bit_error_rate: 0.3 %}",
-    "mtu: 40 B",
-    "ttl: 4 ms",
-    "order: free",
-    "delay: 3 ms",
-    "reorder: {probability: 30 %, extra: 7 ms}",
-)
-CAUSES: Final = {
-    "random_loss", "burst_loss", "queue_full", "crc_fail", "too_big", "expired", "partition", "rx_down", "out_of_range",
-    "snr", "collision", "node_down", "no_route", "filtered", "duty_cycle", "queue_codel", "blocked",
-}  # fmt: skip
-RADIOS: Final = (
-    "", "wifi_5_indoor", "zigbee", "lora_eu868", "dot11p", "range_only", "lte"
-)  # fmt: skip
-TRAFFIC: Final = st.lists(
-    st.lists(
-        st.tuples(st.sampled_from(ENDS), st.sampled_from(("", *ENDS, "red.goal", "nobody")), st.integers(0, 60)),
-        max_size=6,
-    ),
-    min_size=5,
-    max_size=40,
-)
-
-
-@settings(max_examples=40)
-@given(
-    chosen=st.sets(st.sampled_from(IMPAIRMENTS), max_size=5),
-    preset=st.sampled_from(RADIOS),
-    cut=st.booleans(),
-    said=TRAFFIC,
-)
-def test_sent_is_delivered_or_dropped_or_in_flight(
-    chosen: set[str], preset: str, cut: bool, said: list[list[tuple[str, str, int]]]
-) -> None:
-    """At every tick, over all and for every link; each packet has one fate, each drop one cause."""
-    heeded = [one for one in sorted(chosen) if preset in ("", "range_only") or not one.startswith("rate")]
-    sets = [rule(", ".join(["allow: true", *heeded]), "from: '*', to: '*'")]
-    if preset:
-        sets = [f"network.radios={{r: {{preset: {preset}}}}}", "network.robots={'*': [r]}", *sets]
-        sets.append("network.places={a: [0 m, 0 m, 1 m], b: [40 m, 0 m, 1 m], '*': [4 m, 3 m, 1 m]}")
-    if cut:
-        sets.append("network.events=[{at: 10 ms, for: 20 ms, partition: [[a], [rest]]}]")
-    hub = Hub(deployment_of(*sets))
-    number = 0
-    offered: Counter[tuple[str, int]] = Counter()
-    for packets in said:
-        sent: dict[str, list[Sent]] = {}
-        for source, to, size in packets:
-            number += 1
-            if to == source:
-                continue
-            sent.setdefault(source, []).append(Sent(number, to, "data" if to else "news", 0, bytes(size)))
-            offered[source, number] += 0 if to == "nobody" else 1 if to else len(ENDS) - 1
-        hub.close(sent, [RobotPacket("red.goal", 0, "a", "data", b"x")])
-        account, flying = hub.state.packets, [f for f in hub.state.in_flight() if not f.copy]
-        assert account.offered == account.delivered + account.dropped + len(flying)
-        links = hub.state.fabric.states
-        for key, link in links.items():
-            still = sum((f.source, f.destination) == key[:2] for f in flying)
-            assert link.offered == link.delivered + link.dropped + still, key
-        copies = [flight for flight in (*hub.fates, *hub.state.in_flight()) if flight.copy]
-        assert sum(link.copies for link in links.values()) == account.copies == len(copies)
-    final = [f for f in hub.fates if not f.copy]
-    assert len({(f.source, f.destination, f.sequence) for f in final}) == len(final), "one fate each"
-    assert len(final) + len(flying) == sum(offered.values()) + len(said)
-    assert {f.cause for f in hub.fates} - {""} <= CAUSES
-    assert account.dropped == sum(bool(f.cause) for f in final)
 
 
 @settings(max_examples=30)

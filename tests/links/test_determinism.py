@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import random
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Final
 
@@ -128,8 +129,24 @@ def drive(deployment: Deployment, ticks: int = TICKS, folds: Iterable[int] = (),
         sent, robots, edits = traffic(tick)
         hub.close(sent if shuffle is None else shuffle(sent), robots, edits)
         written += map(row, hub.fates[len(written) :])
+        assert_conserved(hub)
     assert written == [row(flight) for flight in hub.fates], "a fate that changed behind its row"
     return hub
+
+
+def assert_conserved(hub: Hub) -> None:
+    """What was sent is delivered, dropped or in flight, in all and between any two; each packet has one fate."""
+    account, flights = hub.state.packets, [*hub.fates, *hub.state.in_flight()]
+    assert len({(f.source, f.destination, f.sequence, f.copy) for f in flights}) == len(flights)
+    flying = Counter((f.source, f.destination) for f in hub.state.in_flight() if not f.copy)
+    assert account.offered == account.delivered + account.dropped + flying.total()
+    assert account.dropped == sum(bool(f.cause) for f in hub.fates if not f.copy)
+    open_on = Counter[tuple[str, str]]()
+    for (source, destination, _), link in hub.state.fabric.states.items():
+        open_on[source, destination] += link.offered - link.delivered - link.dropped
+    assert +open_on == flying
+    copies = sum(link.copies for link in hub.state.fabric.states.values())
+    assert copies == account.copies == sum(f.copy for f in flights)
 
 
 def row(flight: Flight) -> bytes:

@@ -7,17 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from typing import Final
 
 import pytest
 
-from foosim.capture.reader import open_capture
-from foosim.capture.rows import PACKETS, PacketRow
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.simulation.run import rehearse
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import wifi_airtime_ns
@@ -104,21 +100,6 @@ def test_a_rover_parked_between_two_costs_them_decibels_in_the_warehouse(proof: 
         los_db, nlos_db = ENVIRONMENTS["indoor"].both_db(8.0, 5.25e9, (0.4, 0.4))
         proof.within("T21", f"warehouse: a rover between {' and '.join(ends)}, dB", more_db, nlos_db - los_db, 0.02, 1)
         assert more_db > 5.0 and shadowed.received_cdbm < clear.received_cdbm
-
-
-def test_rovers_shadow_each_other_as_they_drive(tmp_path: Path) -> None:
-    """The first second of the warehouse as it is shipped: rows of beacons name rovers that were in the way."""
-    capture = tmp_path / "run.mcap"
-    rehearse(HALL.read_text(), HALL.name, 40, capture=capture)
-    rows = [
-        row for row in open_capture(capture).rows(PACKETS) if isinstance(row, PacketRow) and row.channel == "beacon"
-    ]
-    between = {(name, row.source, row.destination) for row in rows for name in row.walls if name.startswith("rover")}
-    assert between, "nobody was between two others"
-    assert all(name[-2:] not in (source[-2:], to[-2:]) for name, source, to in between), (
-        "one's own rover is no obstacle"
-    )
-    assert {"pillar-1", "wall-long-middle", "shelf-south-inner-1"} & {name for row in rows for name in row.walls}
 
 
 def test_antennas_above_the_hull_see_over_it() -> None:

@@ -6,7 +6,6 @@ import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING
 
 import pytest
@@ -180,17 +179,6 @@ def test_levels_of_room() -> None:
     assert str(Room(40_000_000, 64 << 20, "on its disk")) == "38.1 MiB left on its disk, the reserve is 64 MiB"
 
 
-def test_on_a_disk_that_is_really_full_the_reserve_takes_the_end(
-    hub_run: HubRun, small_disk: Callable[[int], Path]
-) -> None:
-    path = small_disk(144) / "run.mcap"
-    writer = new_writer(path, hub_run, "capture.reserve=64 KiB", "capture.on_full=continue_unlogged")
-    assert feed(writer, hub_run) == [Level.LOW, Level.OUT]
-    assert writer.statistics().refused > 0 and open_capture(path).finished
-    assert_accounted(writer, hub_run)
-    assert_valid(path)
-
-
 def test_on_a_disk_that_others_fill_what_was_whole_stays(
     hub_run: HubRun, small_disk: Callable[[int], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -218,30 +206,3 @@ def test_on_a_disk_that_others_fill_what_was_whole_stays(
     found = recover_capture(path)
     assert found is not None
     assert_valid(found.path)
-
-
-def test_a_capture_that_takes_long_to_close_shows_how_far_it_is(
-    tmp_path: Path, hub_run: HubRun, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its disk takes nothing for a while: the vHub's loop goes on, and is told when it is closed."""
-    writer, write, gate, closed = new_writer(tmp_path / "c.mcap", hub_run), capture_contents.write_all, Event(), Event()
-    room = RoomWatch(writer, tmp_path, 1)
-    monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 1_000_000)
-
-    def slow(file: int, content: bytes) -> None:
-        gate.wait()
-        write(file, content)
-
-    monkeypatch.setattr(capture_file, "write_all", slow)
-    writer.on_end = closed.set
-    for closing in hub_run.closings:
-        writer.keep(closing)
-    writer.begin_finish({"reason": "enough"})
-    before = room.recording
-    assert before["state"] == "closing" and before["written"] < before["offered"] and not writer.has_ended
-    gate.set()
-    assert closed.wait(900)
-    writer.finish()
-    after = room.recording
-    assert after["state"] == "on" and after["written"] == after["offered"] and after["bytes"] > before["bytes"]
-    assert open_capture(tmp_path / "c.mcap").about.end["reason"] == "enough"

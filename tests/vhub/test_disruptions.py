@@ -101,26 +101,3 @@ def test_what_is_asked_for_does_what_it_does_in_a_deployment(script: Script) -> 
     for key, fate in usual.items():
         is_said = key[1] == "red.goal" and not ticks.isdisjoint({asked[key][2], -(-fate[1] // TICK_NS)})
         assert is_said or asked[key] == fate, key
-
-
-@settings(max_examples=30)
-@given(script=SCRIPTS, restarts=st.frozensets(st.integers(0, TICKS - 1), max_size=8))
-def test_restarts_change_no_fate(script: Script, restarts: frozenset[int]) -> None:
-    deployment = deployment_with()
-    assert fates_of(deployment, script, restarts=restarts) == fates_of(deployment, script)
-
-
-def test_a_heal_lets_go_what_a_clog_without_an_end_holds() -> None:
-    script: Script = [(10, {"clog": {"from": "*", "to": "*"}}), (30, {"heal": "clogs"})]
-    perfect = deployment_with("")
-    fates = fates_of(perfect, script)
-    assert {cause for cause, _, _ in fates.values()} <= {"", "in_flight"}
-    held = {key: fate for key, fate in fates.items() if fate[2] >= 10 and fate[1] >= 30 * TICK_NS}
-    on_one_link = [fates["red.goal", "player-red", tick << 16, 0] for tick in range(10, 31)]
-    assert [due_ns for _, due_ns, _ in on_one_link] == [30 * TICK_NS + n for n in range(21)], "in the order of sending"
-    assert {arrival for _, _, arrival in on_one_link[1:]} == {31}
-    assert max(due_ns for _, due_ns, _ in held.values()) < TICKS * TICK_NS, "nothing waits for ever"
-    assert [fates["red.goal", "player-red", tick << 16, 0][1:] for tick in (40, 50)] == [
-        (40 * TICK_NS, 40),
-        (50 * TICK_NS, 50),
-    ]
