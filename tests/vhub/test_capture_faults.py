@@ -199,48 +199,31 @@ def test_a_lagging_writer_slows_the_run_says_so_once_and_loses_nothing(
     hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 30)
-    said: list[tuple[str, str]] = []
+    monkeypatch.setattr(capture_writer, "WAIT_S", 1e-4)
+    said, waits = list[tuple[str, str]](), list[int]()
     Gated.gate.clear()
 
     def say(level: str, text: str) -> None:
-        """The run stands still in `keep` until the writer goes on."""
+        """The run stands still in `keep` until the writer goes on, and is told so again and again meanwhile."""
         said.append((level, text))
-        Gated.gate.set()
+
+    def wait() -> None:
+        waits.append(1)
+        if len(waits) == 3:
+            Gated.gate.set()
 
     path = tmp_path / "slow.mcap"
     writer = Gated(path, hub_run.deployment, "table.yaml", hub_run.text, {}, say)
+    writer.while_waiting = wait
     for closing in hub_run.closings:
         writer.keep(closing)
         assert writer.statistics().queued_rows <= max(30, 1 + len(closing.fates))
     writer.finish()
-    assert writer.statistics().waits > 0 and writer.statistics().queued_rows == 0
+    assert len(waits) >= 3 and writer.statistics().waits > 0 and writer.statistics().queued_rows == 0
     assert [level for level, _ in said] == ["warning"]
     assert said[0][1].startswith(f"the run waits for its capture {path}: ")
     capture = open_capture(path)
     assert len(capture.ticks) == 65 and len(capture.packets) == hub_run.core.statistics().offered
-
-
-def test_who_waits_for_a_full_queue_is_told_so_again_and_again(
-    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """So a vHub can say meanwhile that it lives."""
-    monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 30)
-    monkeypatch.setattr(capture_writer, "WAIT_S", 1e-4)
-    Gated.gate.clear()
-    told = 0
-
-    def wait() -> None:
-        nonlocal told
-        told += 1
-        if told == 3:
-            Gated.gate.set()
-
-    writer = Gated(tmp_path / "slow.mcap", hub_run.deployment, "table.yaml", hub_run.text, {})
-    writer.while_waiting = wait
-    for closing in hub_run.closings:
-        writer.keep(closing)
-    writer.finish()
-    assert told >= 3 and len(open_capture(writer.path).ticks) == 65
 
 
 def test_the_disk_is_asked_for_its_progress_while_a_sync_lasts(

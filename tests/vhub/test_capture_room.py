@@ -15,6 +15,7 @@ from foosim.capture import contents as capture_contents
 from foosim.capture import file as capture_file
 from foosim.capture import writer as capture_writer
 from foosim.capture.mcap.checks import CaptureError
+from foosim.capture.parts import files_from
 from foosim.capture.reader import open_capture
 from foosim.common import limits
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -23,6 +24,7 @@ from foosim.runtime.disk import Level, Room
 from foosim.vhub.recording.disk_watch import RoomWatch
 from foosim.vhub.recording.recorder import Recorder
 from foosim.vhub.recording.recovery import recover_capture
+from tests.vhub.conftest import BY_TIME
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -131,20 +133,23 @@ def test_a_disk_that_is_full_at_the_start_is_reported_at_once(
         new_writer(tmp_path / "full.mcap", hub_run)
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
+@pytest.mark.parametrize(("number", "sets"), [(errno.ENOSPC, ()), (errno.EIO, ()), (errno.ENOSPC, (BY_TIME,))])
 def test_a_disk_that_refuses_leaves_what_is_whole(
-    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, sets: tuple[str, ...]
 ) -> None:
-    """Others take the room that a look has found: the write itself fails, in the midst of a chunk or of the end."""
-    outcomes = set()
+    """Others take the room that a look has found: the write itself fails, in the midst of a chunk or of the end; of
+    several files, also in what the next one begins with."""
+    outcomes, counts = set(), set()
     taken = Disk(0, monkeypatch, number)
     taken.looks = lambda free: 1 << 40
     for room in [*range(40_000, 112_000, 8_765), 150_000]:
         taken.room = room
-        writer = new_writer(tmp_path / f"{room}.mcap", hub_run)
+        writer = new_writer(tmp_path / f"{room}.mcap", hub_run, *sets)
         feed(writer, hub_run)
         assert_accounted(writer, hub_run)
-        capture = open_capture(writer.path)
+        capture, files = open_capture(writer.path), files_from(writer.path)
+        assert all(open_capture(file).about.versions for file in files), "none that is only begun"
+        counts.add(len(files))
         assert capture.about.unfinished_bytes == 0, "nothing that is cut stays"
         refused = writer.statistics().refused
         outcomes.add((writer.state.level, capture.finished, refused > 0))
@@ -154,6 +159,9 @@ def test_a_disk_that_refuses_leaves_what_is_whole(
         found = recover_capture(writer.path)
         assert (found is None) == capture.finished
         assert_valid(writer.path if found is None else found.path)
+    assert (len(counts) > 1) == bool(sets)
+    if sets:
+        return
     assert (Level.FINE, True, False) in outcomes and (Level.OUT, False, True) in outcomes, outcomes
     assert (Level.OUT, False, False) in outcomes, "a disk that took all rows and refused the end"
 

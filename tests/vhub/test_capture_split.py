@@ -17,13 +17,11 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import McapFile, Message
 from foosim.capture.parts import Joined, files_from
 from foosim.capture.reader import open_capture, read_about
-from foosim.runtime.disk import Level
 from foosim.runtime.journal import Journal
 from foosim.vhub.recording.recovery import recover_capture
-from tests.vhub.conftest import BY_TIME, LOG_LINES
+from tests.vhub.conftest import BY_TIME
 from tests.vhub.conftest import write_capture as write
 from tests.vhub.test_capture_recovery import read_by_others
-from tests.vhub.test_capture_room import Disk
 
 if TYPE_CHECKING:
     from tests.vhub.conftest import HubRun
@@ -165,46 +163,6 @@ def test_others_of_like_names_are_left_alone(path: Path, tmp_path: Path) -> None
     for name in ("run.mcap", "run_0001.mcap", "run_12.mcap"):
         shutil.copy(path, tmp_path / name)
     assert files_from(tmp_path / "run.mcap") == [tmp_path / "run.mcap"]
-
-
-# --- disks that refuse -----------------------------------------------------------------------------------------------
-
-
-def test_a_disk_that_refuses_leaves_whole_files(
-    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It refuses rows, the next file's description, what is repeated there, or a file's end."""
-    monkeypatch.setattr(capture_writer, "BATCH_ROWS", 40)
-    monkeypatch.setattr(capture_contents, "CHUNK_BYTES", 1)
-    taken = Disk(1 << 40, monkeypatch)
-    taken.looks = lambda free: 1 << 40
-    counts = set()
-    write(tmp_path / "all" / "run.mcap", hub_run, BY_TIME)
-    first = (tmp_path / "all" / "run.mcap").stat().st_size
-    for room in (first - 3_000, first + 10, first + 20_000, first + 36_000, first + 60_000, first + 90_000):
-        taken.room = room
-        path = tmp_path / str(room) / "run.mcap"
-        writer = write(path, hub_run, BY_TIME)
-        text = f"{files_from(path)[-1]}: cannot be written, No space left"
-        assert writer.state.level is Level.OUT and writer.state.text.startswith(text)
-        found, capture = writer.statistics(), open_capture(path)
-        assert found.offered == found.written + found.refused and found.refused > 0
-        assert capture.about.unfinished_bytes == 0
-        assert len(capture.ticks) + len(capture.packets) + len(capture.epochs) + logged(path) == found.written
-        assert all(len(open_capture(file).ticks) for file in files_from(path)), "none that holds nothing"
-        counts.add(len(files_from(path)))
-        taken.room = 1 << 40
-        recovered = recover_capture(path)
-        assert (recovered is None) == capture.finished
-        whole = path if recovered is None else recovered.path
-        assert open_capture(whole).finished and read_by_others(files_from(whole)[-1]) > 0
-    assert len(counts) > 1
-
-
-def logged(path: Path) -> int:
-    """How many of the test's lines of the log are there."""
-    texts = {text.encode() for _, text, _ in LOG_LINES}
-    return sum(any(text in message.data for text in texts) for message in messages(path) if message.topic == "/log")
 
 
 # --- only the last ---------------------------------------------------------------------------------------------------
