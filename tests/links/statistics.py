@@ -45,11 +45,6 @@ def ks_normal(sample: Sequence[float], mean: float = 0.0, deviation: float = 1.0
     return float(stats.ks_1samp(sample, stats.norm(mean, deviation).cdf).pvalue)
 
 
-def ks_uniform(sample: Sequence[float]) -> float:
-    """Return the p-value of Kolmogorov's test against the uniform law between 0 and 1."""
-    return float(stats.ks_1samp(sample, stats.uniform.cdf).pvalue)
-
-
 def chi_square(observed: Sequence[int], expected: Sequence[float]) -> float:
     """Return the p-value of Pearson's test of counts; neighbours are merged until 5 are expected in each class."""
     classes = [[0.0, 0.0]]

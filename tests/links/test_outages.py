@@ -61,18 +61,6 @@ def test_lengths_are_of_their_laws(proof: Proof, dwell: ParetoDwell | None) -> N
     proof.normal("T6", "lengths of bad times by Pareto that are cut at 400 ms", z, len(bad))
 
 
-def test_two_flows_see_the_same_bad_times(proof: Proof) -> None:
-    """10 Hz and 1 kHz on one link: each slow packet meets what the fast one at its time meets."""
-    n = proof.size(30_000, 600_000)
-    settings = "burst: {loss: 20 %, mean_bad: 250 ms}"
-    fabric = fabric_of(settings, proof.seed)
-    fast = {f.sent_ns: f.cause for f in fates(fabric, every(MS, n), channel="fast")}
-    slow = {f.sent_ns: f.cause for f in fates(fabric_of(settings, proof.seed), every(100 * MS, n // 100))}
-    differing = sum(fast[at] != cause for at, cause in slow.items())
-    proof.exact("T6", "packets of a 10 Hz flow that meet another state than those of a 1 kHz flow", differing, 0, n)
-    assert set(slow.values()) == {"", "burst_loss"}
-
-
 def test_two_flows_on_one_link_in_turns() -> None:
     """The flows share the link's objects too, in whatever order they ask for times: earlier ones after later ones."""
     settings = "burst: {loss: 20 %, mean_bad: 25 ms}"

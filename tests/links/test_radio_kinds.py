@@ -18,12 +18,10 @@ from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import wifi_airtime_ns
 from foosim.vhub.radio.errors import DOT11N_MODES, LORA_GATEWAY_SENSITIVITY_DBM, LORA_SENSITIVITY_DBM, MODES
-from foosim.vhub.radio.path_loss import ENVIRONMENTS
 from foosim.vhub.radio.timings import WIFI_5, with_category
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.frame import Frame
 from tests.links.offered import TABLE, deployment_of
-from tests.links.proof import Proof
 
 HALL: Final = TABLE.parent / "warehouse.yaml"
 
@@ -78,28 +76,6 @@ def test_a_vehicle_between_vehicles_blocks_as_vehicles_do(environment: str) -> N
     assert both.walls_cdb == blocked.walls_cdb + other.walls_cdb
     indoors = signal(hall(radio("indoor")), BETWEEN)
     assert indoors.walls_cdb == 6000, "elsewhere it is the metal that it is of"
-
-
-def shipped(*sets: str) -> Deployment:
-    """The warehouse as it is, without shadowing and fading."""
-    still = "network.radios.wifi.shadowing={on: false}", "network.radios.wifi.fading=null"
-    return load_deployment(apply_sets(HALL.read_text(), "hall.yaml", [*still, *sets]), "hall.yaml")
-
-
-def test_a_rover_parked_between_two_costs_them_decibels_in_the_warehouse(proof: Proof) -> None:
-    """In an aisle, pilots over Wi-Fi: as much as its metal takes, or the way round the line of sight; both ways."""
-    aisle = {"rover01": (-13.0, 6.25), "rover02": (-5.0, 6.25)}
-    deployment = shipped()
-    clear = signal(deployment, {**aisle, "rover03": (-9.0, 1.25)}, ("pilot01", "pilot02"))
-    for ends in (("pilot01", "pilot02"), ("pilot02", "pilot01")):
-        shadowed = signal(deployment, {**aisle, "rover03": (-9.0, 6.3)}, ends)
-        assert (clear.walls, shadowed.walls, shadowed.walls_cdb) == ((), ("rover03",), 6000)
-        more_db = (shadowed.path_loss_cdb - clear.path_loss_cdb) / 100
-        budget = Fabric(deployment).link(*ends, "beacon").setup_at(0).budget
-        assert budget is not None
-        los_db, nlos_db = ENVIRONMENTS["indoor"].both_db(8.0, 5.25e9, (0.4, 0.4))
-        proof.within("T21", f"warehouse: a rover between {' and '.join(ends)}, dB", more_db, nlos_db - los_db, 0.02, 1)
-        assert more_db > 5.0 and shadowed.received_cdbm < clear.received_cdbm
 
 
 def test_antennas_above_the_hull_see_over_it() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 from hypothesis import given
@@ -23,7 +23,6 @@ from foosim.simulation.what_if import what_if
 from foosim.vhub.network.ages import Ages, quantile
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import HubRecord, TickRecord
-from tests.laws.test_hub_recovery_law import Fault, Seen, fly
 from tests.turns import BY_PERIOD
 from tests.vhub.conftest import WATCHER, HubRun
 
@@ -113,17 +112,6 @@ def test_a_capture_tells_each_second_and_whatif_and_report_have_it(tmp_path: Pat
     (use,) = [use for use in found["uses"] if (use["source"], use["destination"]) == ("camera", "player-red")]
     assert (use["channel"], use["delay_mean_ms"], use["p99_ms"], use["uses"]) == ("ball", 7.0, 10.0, 122)
     assert "<h2>Age at use</h2>" in page(found)
-
-
-def test_a_vhub_that_is_started_again_counts_on() -> None:
-    def ages(seen: Seen) -> list[Any]:
-        return [(closing.frame.tick, age) for closing in seen.closings for age in closing.ages]
-
-    sets = delayed("1300 us")
-    usual = fly([], TICKS, sets)
-    kills: list[Fault] = [(40, lambda system: system.kill_hub("torn")), (510, lambda system: system.kill_hub("now"))]
-    seen = fly(kills, TICKS, sets)
-    assert ages(seen) == ages(usual) and len(ages(usual)) == 20
 
 
 @given(st.lists(st.integers(0, 2**40), min_size=1, max_size=200))

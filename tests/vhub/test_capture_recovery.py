@@ -343,15 +343,6 @@ def test_the_reserve_of_the_disk_is_kept(chunked: bytes, tmp_path: Path, monkeyp
     assert [left.name for left in tmp_path.iterdir()] == ["cut.mcap"]
 
 
-def test_a_journal_that_is_damaged_gives_what_is_before(chunked: bytes, hub_run: HubRun, tmp_path: Path) -> None:
-    with Journal(tmp_path / "gap", "vhub") as journal:
-        for record in [*hub_run.records[:51], *hub_run.records[52:]]:
-            journal.append(record)
-    found = recovered(cut(tmp_path, chunked[: len(chunked) // 2]), tmp_path / "gap")
-    assert found.tick == 49 and "record 51 of the vHub's journal does not follow on tick 49" in found.problem
-    assert open_capture(found.path).ticks.tolist() == list(range(50))
-
-
 def test_no_capture_is_refused(tmp_path: Path) -> None:
     for content in (b"", MAGIC, b"#!/bin/sh\n"):
         with pytest.raises(Refused, match=r"cut\.mcap: "):
