@@ -22,13 +22,11 @@ from foosim.protocol.channels import CLIENT_READS, Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import (
     Build,
-    ClientRefusal,
     ClientWelcome,
     Commit,
     Deliveries,
     Done,
     Down,
-    End,
     Epoch,
     Go,
     Join,
@@ -209,17 +207,6 @@ def test_who_is_refused_is_told_why_and_asks_no_more(name: str, world: str, reas
     assert (core.refusal, core.welcome, core.deadline_ns()) == (reason, None, NEVER_NS)
 
 
-def test_a_second_client_of_a_name_is_refused_and_the_first_stays() -> None:
-    air = Air()
-    first = air.enter("ear", 0)
-    second = ClientCore("ear", "two", 0)
-    air.carry(second)
-    assert second.refusal == "a client ear is already here"
-    refusal = encode(ClientRefusal("ear", "two", "no"))
-    first.receive(channels.CLIENT_REFUSAL, "ear", refusal, 0)
-    assert not first.refusal, "it is for another boot"
-
-
 def test_a_welcome_with_a_deployment_that_is_not_valid_is_a_refusal() -> None:
     core = ClientCore("ear", "one", 0)
     welcome = ClientWelcome("ear", "one", "hub", 0, 0, NAME, "format: 2\n")
@@ -310,23 +297,6 @@ def test_many_packets_go_in_as_many_messages_as_they_need() -> None:
     messages = [decode_any(Join | Up | Done, message.payload) for message in published(core)]
     assert len(messages) == 3
     assert [p.sequence for m in messages if isinstance(m, Up) for p in m.packets] == list(range(1, 71))
-
-
-def test_the_end_is_heard_and_nothing_after_it() -> None:
-    air = Air()
-    core = air.enter("hand", 1)
-    air.start()
-    air.close()
-    air.carry(core)
-    assert core.go is not None
-    air.tell(channels.END, channels.SUPERVISOR, encode(End(0, "enough", False)))
-    air.now_ns += limits.DOWNLINK_KEPT_NS
-    air.hub.wake(air.now_ns)
-    air.carry(core)
-    assert core.ended and core.deadline_ns() == NEVER_NS
-    ended = in_run("hand", 1)
-    taken(ended, down(1, ended=True), Go(9, 9, 0, []))
-    assert (ended.ended, ended.go) == (True, None)
 
 
 # --- what does not fit -----------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from foosim.library.table.settings import LINE_NAMES
 from foosim.protocol import channels
 from foosim.protocol.actions import Publish
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Subscription, Up
+from foosim.protocol.messages import ClientWelcome, Done, Down, Go, Join, Received, Up
 from foosim.simulation.run import rehearse
 from tests.turns import BY_PERIOD
 
@@ -85,17 +85,6 @@ def sample(source: str, channel: str, sequence: int, *numbers: float) -> Receive
 # --- the loop --------------------------------------------------------------------------------------------------------
 
 
-def test_it_joins_with_its_rate_and_what_it_hears() -> None:
-    loop = begun()
-    (join,) = said(loop)
-    assert isinstance(join, Join)
-    assert join.period == 5
-    rods = sorted(LINE_NAMES)
-    heard = [Subscription("camera", "ball"), *(Subscription(f"red.{line}", "encoder") for line in rods)]
-    assert join.subscriptions == heard
-    assert Scripted.made[-1].parameters == {"team": "red"}
-
-
 def test_samples_are_the_newest_of_each_channel() -> None:
     loop = begun()
     player = Scripted.made[-1]
@@ -134,7 +123,8 @@ def test_packets_leave_before_commands_which_are_packed_in_name_order_and_answer
 def test_it_hears_what_its_selectors_match_beside_its_robots() -> None:
     loop = begun("players.player-red.hears={'player-*': [beacon], 'blue.*': [encoder], camera: [echo]}")
     (join,) = said(loop)
-    assert isinstance(join, Join)
+    assert isinstance(join, Join) and join.period == 5
+    assert Scripted.made[-1].parameters == {"team": "red"}
     heard = {(item.source, item.channel) for item in join.subscriptions}
     rods = {(f"{team}.{line}", "encoder") for team in ("red", "blue") for line in LINE_NAMES}
     assert heard == rods | {("camera", "ball"), ("player-blue", "beacon"), ("camera", "echo")}

@@ -204,21 +204,6 @@ def test_hello_is_said_often_while_the_vhub_is_gone_and_at_once_when_it_is_there
     assert ear.lost
 
 
-def test_a_client_of_a_run_that_has_begun_waits_as_long_as_the_run() -> None:
-    air = Storm()
-    air.start()
-    ear = air.enter("ear", 0)
-    for _ in range(TICKS):
-        air.close()
-        air.carry(ear)
-    assert ear.statistics().received
-    ear.hub_gone(air.now_ns)
-    ear.wake(air.now_ns + DEPLOYMENT.deadlines.vhub_back_ns - 1)
-    assert not ear.lost
-    ear.wake(air.now_ns + DEPLOYMENT.deadlines.vhub_back_ns)
-    assert ear.lost, "a run does not wait longer for it either"
-
-
 def test_a_vhub_that_comes_back_with_another_run_is_not_gone_on_with() -> None:
     air = Storm()
     air.start()
