@@ -70,7 +70,7 @@ class HubState:
         self._fates: list[list[Flight]] = []
         """Drops of each packet that clients sent at the last closed tick, in that order; then arrivals at robots."""
         self._deferred: list[tuple[list[Flight], list[Flight]]] = []
-        """Packets of these that are not judged yet: the flights to their receivers, and the list for their drops."""
+        """The packets of these still to be judged: the flights to their receivers, and the list for their drops."""
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
