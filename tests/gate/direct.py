@@ -185,7 +185,7 @@ DIRECT: Final = (
     DirectMutant(
         "an unanswered Go is not sent again",
         "the Go of a player that left owing is sent again after the record",
-        "tests/vhub/test_door.py::test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_unsaid",
+        "tests/vhub/test_sessions.py::test_a_vhub_that_dies_behind_the_record_of_who_left_owing_leaves_nothing_unsaid",
         _unsent,
     ),
     DirectMutant(
