@@ -209,7 +209,7 @@ def create_run(world: str, name: str | None = None, stamp: str = "") -> RunFolde
     if name is not None and (parent / name / LOGS).is_dir() and RunFolder(parent / name).is_fresh():
         return RunFolder(parent / name)  # made for us by the process that waits for the run
     parent.mkdir(parents=True, exist_ok=True)
-    _forget_old(parent)
+    forget_old(parent)
     path = _make(parent, name or f"{world[:12]}-{stamp or wall_clock.now_stamp()}", is_free=name is None)
     folder = RunFolder(path)
     folder.logs.mkdir()
@@ -231,7 +231,7 @@ def _make(parent: Path, stem: str, *, is_free: bool) -> Path:
     raise Refused(f"no free name for a run in {parent}")
 
 
-def _forget_old(parent: Path) -> None:
+def forget_old(parent: Path) -> None:
     """Remove the folders of all but the last runs that are over. A folder without a run file is just being made."""
     over = [folder for folder in _newest_first(parent) if not folder.is_live()]
     for folder in over[KEPT_RUNS - 1 :]:
@@ -248,9 +248,9 @@ def _newest_first(parent: Path) -> list[RunFolder]:
     return [folder for _, _, folder in sorted(found, key=lambda entry: entry[:2], reverse=True)]
 
 
-def live_runs() -> list[RunFolder]:
-    """Return the live runs of this user, the newest first."""
-    return [folder for folder in _newest_first(runs_folder()) if folder.is_live()]
+def live_runs(parent: Path | None = None) -> list[RunFolder]:
+    """Return the live runs in a folder, by default those of this user, the newest first."""
+    return [folder for folder in _newest_first(parent or runs_folder()) if folder.is_live()]
 
 
 def left_runs() -> list[RunFolder]:

@@ -18,7 +18,7 @@ from foosim.common.limits import LAG_ANCHOR_NS
 from foosim.common.units import TIME, parse_ns, parse_pace
 from foosim.runtime.command import DONE, FAILED, PKI_VARIABLE, JsonOption, PkiOption, print_json
 from foosim.runtime.process import Stop
-from foosim.simulation.play.address_file import newest_place
+from foosim.simulation.play.address_file import newest_replay
 from foosim.simulation.play.main import PlayOptions, PlayResult, Stopper, play_capture
 from foosim.simulation.play.requests import ARGUMENTS, SEEK, STEP
 from foosim.simulation.play.terminal import Lines
@@ -108,8 +108,8 @@ def control(
     """
     arguments = _arguments(request, value)
     if address is None:
-        place = newest_place()
-        address = place.address
+        place = newest_replay()
+        address = place.simulation
         if pki is None and place.pki:
             pki = Path(os.environ.get(PKI_VARIABLE) or place.pki)
     with hear_replay(address, (), pki=pki) as replay:
