@@ -10,8 +10,8 @@ from math import isnan
 from typing import Any
 
 from foosim.console.clock.deck import Clock
-from foosim.console.shown.compare import Positions
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Source, Wanted
+from foosim.console.shown.tracks import Positions
 
 
 class HeardClock(Clock):
@@ -19,30 +19,19 @@ class HeardClock(Clock):
 
     def __init__(self, tick_ns: int, clock_ns: Callable[[], int]) -> None:
         super().__init__(tick_ns, clock_ns)
-        self._time_ns, self._jumps, self._paused = 0, 0, True
+        self._time_ns = 0
 
     def heard(self, moment: Moment) -> None:
         """Take the time of a moment."""
-        self._time_ns, self._paused = round(moment.tick * self.tick_ns), moment.paused
-        self._jumps += moment.jump
+        self._time_ns, self.paused = round(moment.tick * self.tick_ns), moment.paused
+        self.jumps += moment.jump
         self.changed()
-
-    @property
-    def jumps(self) -> int:
-        return self._jumps
-
-    @property
-    def paused(self) -> bool:
-        return self._paused
 
     def time_ns(self) -> int:
         return self._time_ns
 
     def wall_ns(self, time_ns: int) -> int | None:
         return None
-
-    def account(self) -> dict[str, Any]:
-        return {"state": "paused" if self._paused else "running"}
 
 
 class Leader:
