@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
@@ -171,8 +172,11 @@ def replay(*arguments: str | Path) -> Done:
 
 
 def foosim(*words: str | Path) -> Done:
-    """Run `foosim` as a person would: what is refused is told on standard error."""
+    """Run `foosim` as a person would: what is refused is told on standard error. The process keeps its signals."""
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     done = CliRunner().invoke(app, [str(word) for word in words])
+    for number, handler in kept.items():
+        signal.signal(number, handler)
     if isinstance(done.exception, Refused):
         return Done(done.exception.exit_code, done.stdout, f"{done.stderr}{done.exception}\n")
     if done.exception is not None and not isinstance(done.exception, SystemExit):
