@@ -186,6 +186,16 @@ def test_a_damaged_one_plays_up_to_there_and_fails(run: Path, tmp_path: Path) ->
         assert result.failed and "damaged.mcap: byte " in result.reason and result.published > 100
 
 
+def test_a_loop_plays_its_part_again_until_it_is_stopped(run: Path) -> None:
+    part: dict[str, Any] = {"from_ns": 100 * MS, "until_ns": 120 * MS, "loop": True, "topics": ("/tf",)}
+    with playing(run, pace=FAST, paused=True, **part) as play, hear_replay(play.address) as heard:
+        heard.resume()
+        times: list[int] = []
+        while len(times) < 9:
+            times += [item.time_ns for item in heard.take(LIMIT_S) if isinstance(item, PlayedPoses)]
+        assert times[:6] == [100 * MS, 120 * MS] * 3 and heard.clock is not None and heard.clock.jumps > 0
+
+
 def test_the_command_controls_the_newest_replay(run: Path) -> None:
     none = replay("control", "pause")
     assert none.code == 1 and "no replay runs here" in none.err
