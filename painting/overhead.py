@@ -111,14 +111,14 @@ def _standing(scene: Scene) -> Region:
     boxes = [shape_box(shape) for shape in scene.scenery]
     boxes = [box for box in boxes if box[1][2] > STANDING_M]
     if not boxes:
-        boxes = [swept_box(body) for body in scene.bodies.values() if not body.is_free and _has_shapes(body)]
+        boxes = [
+            swept_box(body)
+            for body in scene.bodies.values()
+            if not body.is_free and any(link.shapes for link in body.links)
+        ]
     if not boxes:
         return -SIDE_M / 2, -SIDE_M / 2, SIDE_M / 2, SIDE_M / 2
     (low_x, low_y, _), (high_x, high_y, _) = enclosing(boxes)
     x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
     across, along = (max(side * MARGIN / 2, STANDING_M) for side in (high_x - low_x, high_y - low_y))
     return x - across, y - along, x + across, y + along
-
-
-def _has_shapes(body: Body) -> bool:
-    return any(link.shapes for link in body.links)

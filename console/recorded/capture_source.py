@@ -27,7 +27,7 @@ from foosim.console.recorded.capture_curves import curve_points, reading_points,
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.recording import Look, Recording
 from foosim.console.shown.curves import name_and_unit
-from foosim.console.shown.links import Links, lost_where
+from foosim.console.shown.links import Links, links_message
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
 from foosim.console.shown.tracks import Where
 from foosim.deployment.loader import load_deployment
@@ -212,7 +212,8 @@ class FileSource:
 
     async def _gather(self, feed: Feed) -> None:
         """Read events, slice by slice, and publish the marks as they are found."""
-        history = await self._in(self._back, self._open_history)
+        path, topics = self.recording.path, (PACKETS, CLIENTS)
+        history = await self._in(self._back, lambda: CaptureHistory(Recording(path, topics)))
         is_reported = False
         while True:
             try:
@@ -233,9 +234,6 @@ class FileSource:
                     return
                 await asyncio.sleep(REFRESH_S)
                 await self._in(self._back, history.refresh)
-
-    def _open_history(self) -> CaptureHistory:
-        return CaptureHistory(Recording(self.recording.path, (PACKETS, CLIENTS)))
 
     async def _refresh(self, feed: Feed) -> None:
         """Read the growing file until the capture is finished."""
@@ -286,24 +284,12 @@ class FileSource:
     def _link_messages(self, history: CaptureHistory, tick: int) -> list[dict[str, Any]]:
         at_ns = tick * self.recording.tick_ns
         continues = at_ns - WINDOW_NS < self._sent_ns <= at_ns
-        drops = [
-            {"from": key[0], "to": key[1], "cause": cause, "where": lost_where(cause), "count": count}
-            for key, cause, count in history.links.drops(self._sent_ns if continues else at_ns - WINDOW_NS, at_ns)
-        ]
+        drops = history.links.drops(self._sent_ns if continues else at_ns - WINDOW_NS, at_ns)
         frame = history.recording.frame_up_to(tick)
         if frame is not None:
             self._ends.move(frame)
         links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
-        messages: list[dict[str, Any]] = [
-            {
-                "type": "links",
-                "at": tick,
-                "window_s": WINDOW_NS / 1e9,
-                "in_all": len(links),
-                "links": links,
-                "drops": drops,
-            }
-        ]
+        messages = [links_message(tick, WINDOW_NS / 1e9, len(links), links, drops)]
         for source, destination in self._wanted.links:
             messages.append({"type": "watched", **history.watched(source, destination, at_ns)})
         after_ns = self._sent_ns if continues else at_ns - WINDOW_NS // 10

@@ -106,8 +106,9 @@ def test_requests_leave_nothing_out_and_repeat_nothing(
         while not paused and place < len(times) and times[place] <= until:
             heard.append((wall + (times[place] - at) / pace, times[place]))
             place += 1
-        assert playback.ended == (until == LAST_MS and not paused)
-        if playback.ended:
+        is_over = until == LAST_MS and not paused
+        assert playback.ended == is_over
+        if is_over:
             break
         wall, at = wall + passed, until
         now_ns = theatre.now_ns
@@ -128,7 +129,7 @@ def test_requests_leave_nothing_out_and_repeat_nothing(
                 heard.append((wall, times[place]))
                 place += 1
             theatre.turn()
-            if playback.ended:
+            if at == LAST_MS:
                 break
     assert theatre.heard == [(int(wall * MS), int(time * MS)) for wall, time in heard]
     assert (playback.published, playback.late_ns_max, playback.slips, playback.failure) == (len(heard), 0, 0, "")
