@@ -8,7 +8,7 @@ the outline of its hull. Fixed shapes are painted once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor, inf
+from math import inf
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -83,11 +83,6 @@ class OverheadPainter:
             seen = one.heights >= self._heights[one.places]
             self._ground[one.places[seen]] = one.colours[seen]
             self._heights[one.places[seen]] = one.heights[seen]
-
-    def pixel(self, x: float, y: float) -> tuple[int, int]:
-        """Return column and row of the pixel that shows a place (m), whether it is within the picture or not."""
-        view = self.view
-        return floor((x - view.left) * view.scale), floor((view.top - y) * view.scale)
 
     def paint(self, frame: Frame) -> Picture:
         """Return the picture of a frame of the layout: uint8, of the shape (height, width, 3), red, green and blue.
