@@ -43,8 +43,9 @@ class AgeTallies:
 
     def result(self) -> dict[Channel, AgeAtUse]:
         """Return the ages of each channel, by name."""
-        return {channel: self._age(counts) for channel, counts in sorted(self._counts.items()) if counts}
-
-    def _age(self, counts: Counts) -> AgeAtUse:
-        figures = quantile(counts, 0.5), quantile(counts, 0.99), max(counts)
-        return AgeAtUse(sum(counts.values()), *(ticks * self._tick_ns / 1e6 for ticks in figures))
+        found = {}
+        for channel, counts in sorted(self._counts.items()):
+            if counts:
+                figures = quantile(counts, 0.5), quantile(counts, 0.99), max(counts)
+                found[channel] = AgeAtUse(sum(counts.values()), *(ticks * self._tick_ns / 1e6 for ticks in figures))
+        return found

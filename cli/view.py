@@ -21,8 +21,7 @@ from foosim.client.replay_listener import hear_replay
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue, Refused
 from foosim.console.clock.leading import Leader
-from foosim.console.live.live_source import LiveSource
-from foosim.console.live.presence import how_ended
+from foosim.console.live.live_source import LiveSource, how_ended
 from foosim.console.recorded.capture_source import FileSource
 from foosim.console.recorded.poses_source import PosesSource
 from foosim.console.recorded.replay_source import PlayedSource

@@ -24,7 +24,8 @@ def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
     `module:Class` are any.
     """
     schema = Deployment.model_json_schema(by_alias=True, mode="validation")
-    schema["properties"]["engine"] = _any_engine(installed=installed)
+    engines = [name for name in registry.engines() if installed or ENGINES[name].path.startswith(OWN)]
+    schema["properties"]["engine"] = {"enum": engines, "title": "Engine", "type": "string"}
     definitions = schema["$defs"]
     for name, form in OPEN.items():
         if form != "model":
@@ -56,16 +57,6 @@ def _kit(name: str) -> Kit:
     return kit
 
 
-def _any_engine(*, installed: bool) -> dict[str, Any]:
-    """Return the schema of an engine's name."""
-    known = [name for name in registry.engines() if installed or ENGINES[name].path.startswith(OWN)]
-    return {"enum": known, "title": "Engine", "type": "string"}
-
-
-def _class() -> dict[str, Any]:
-    return {"pattern": CLASS_PATTERN, "title": "Class", "type": "string"}
-
-
 def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_robot: bool = True) -> dict[str, Any]:
     """Return the schema of anything of a form by its kind, and add that of each kind to the definitions.
 
@@ -88,7 +79,7 @@ def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_
     definitions[any_class] = {
         "allOf": [{"required": [key]}],  # of a part of it, too: any other part is one of a kind that is known
         "description": f"{noun} of any module on the path. Its other keys are those of its settings.",
-        "properties": {key: _class()},
+        "properties": {key: {"pattern": CLASS_PATTERN, "title": "Class", "type": "string"}},
         "required": [key],
         "title": any_class,
         "type": "object",

@@ -151,7 +151,7 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
             raise _Misplaced(steps[index][1], describe("set inside a value other than a mapping", steps[index][0]))
         key, used = _key(node.values, steps, index) or _key(taken.names(), steps, index) or (steps[index][0], 1)
         if index + used == len(steps):
-            if taken.steps[:1] == [TEMPLATES] and _is_null(value) and key in node.values:
+            if taken.steps[:1] == [TEMPLATES] and plain(value) is None and key in node.values:
                 del node.keys[key], node.values[key]  # a null of a template with nothing below it would stay
                 if key not in taken.names():
                     return
@@ -163,10 +163,6 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
         node = node.values[key]
         index += used
         taken.steps.append(key)
-
-
-def _is_null(value: Tree) -> bool:
-    return isinstance(value, Leaf) and value.value is None
 
 
 @dataclass(slots=True)

@@ -5,10 +5,10 @@ no file. The path is followed through the JSON Schema of the deployment, which k
 and choices are valid there.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -100,12 +100,20 @@ def _is_cause(detail: ErrorDetails) -> bool:
 def _finding(detail: ErrorDetails, path: Location, root: "_Schema") -> Finding:
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     location, schema, is_key = root.follow(path)
+    at: Literal["key", "value"] = "key" if is_key else "value"
     if kind == "extra_forbidden":
-        return _unknown(location, root.follow(path[:-1])[1])
-    translate = _TRANSLATIONS.get(kind)
-    if translate is not None:
-        finding = translate(location, schema, value, context)
-        return replace(finding, at="key") if is_key else finding
+        key, valid = location[-1], tuple(root.follow(path[:-1])[1].get("properties", ()))
+        return Finding(location, UNKNOWN, key, nearest_quoted(key, valid), "key", valid=valid)
+    if kind == "missing":
+        return Finding(location, "missing key", location[-1], at="missing")
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        key = str(context["discriminator"]).strip("'")
+        if kind == "union_tag_not_found":
+            return Finding((*location, key), "missing key", key, at="missing")
+        tag = value.get(key) if isinstance(value, dict) else value
+        return _not_a_choice((*location, key), tag, sorted(schema["discriminator"]["mapping"]), at)
+    if kind == "literal_error":
+        return _not_a_choice(location, value, schema.get("enum", [schema.get("const")]), at)
     nearest = context.get("nearest")
     if kind == "bool_type" and isinstance(value, str):
         nearest = _BOOLEANS.get(value.lower())
@@ -114,7 +122,15 @@ def _finding(detail: ErrorDetails, path: Location, root: "_Schema") -> Finding:
     what = _PATTERNS.get(context.get("pattern", "")) or _KINDS.get(kind) or _bounds(kind, context) or detail["msg"]
     if kind == "bad_value" and isinstance(value, dict):
         value = ABSENT  # the error is between its settings, which the text names
-    return Finding(location, what, location[-1] if is_key else value, nearest, "key" if is_key else "value")
+    return Finding(location, what, location[-1] if is_key else value, nearest, at)
+
+
+def _not_a_choice(location: Location, value: object, choices: Sequence[Any], at: Literal["key", "value"]) -> Finding:
+    texts = [str(choice) for choice in choices]
+    is_text = isinstance(value, str) and isinstance(choices[0], str)  # only a text is written in quotes
+    return Finding(
+        location, f"not one of {', '.join(texts)}", value, nearest_quoted(value, texts) if is_text else None, at
+    )
 
 
 def _bounds(kind: str, context: Mapping[str, Any]) -> str | None:
@@ -122,46 +138,6 @@ def _bounds(kind: str, context: Mapping[str, Any]) -> str | None:
         return "empty"
     text = _BOUNDS.get(kind)
     return None if text is None else text.format(**context)
-
-
-def _missing(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
-    return Finding(location, "missing key", location[-1], at="missing")
-
-
-def _unknown(location: Location, parent: Mapping[str, Any]) -> Finding:
-    key, valid = location[-1], tuple(parent.get("properties", ()))
-    return Finding(location, UNKNOWN, key, nearest_quoted(key, valid), "key", valid=valid)
-
-
-def _choice(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
-    choices = schema.get("enum", [schema.get("const")])
-    finding = _not_a_choice(location, value, [str(choice) for choice in choices])
-    # Only a text is written in quotes.
-    return finding if isinstance(choices[0], str) else replace(finding, nearest=None)
-
-
-def _tag(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
-    key = str(context["discriminator"]).strip("'")
-    tag = value.get(key) if isinstance(value, dict) else value
-    return _not_a_choice((*location, key), tag, sorted(schema["discriminator"]["mapping"]))
-
-
-def _no_tag(location: Location, schema: Mapping[str, Any], value: object, context: Mapping[str, Any]) -> Finding:
-    key = str(context["discriminator"]).strip("'")
-    return Finding((*location, key), "missing key", key, at="missing")
-
-
-def _not_a_choice(location: Location, value: object, choices: Sequence[str]) -> Finding:
-    nearest = nearest_quoted(value, choices) if isinstance(value, str) else None
-    return Finding(location, f"not one of {', '.join(choices)}", value, nearest)
-
-
-_TRANSLATIONS: Final[dict[str, Callable[[Location, Mapping[str, Any], object, Mapping[str, Any]], Finding]]] = {
-    "missing": _missing,
-    "literal_error": _choice,
-    "union_tag_invalid": _tag,
-    "union_tag_not_found": _no_tag,
-}
 
 
 class _Schema:

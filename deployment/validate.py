@@ -451,7 +451,7 @@ def _not_there(name: str, kits: Collection[str]) -> Iterator[str]:
         yield f"is of the model {model.name}, which is one of robots: these have owners, and are in robots:"
     for problem in _needs_kit(model, kits, model.name):
         yield f"is of a model that cannot be there: {problem}"
-    yield from (f"is {problem}" for problem in _model_problems(model, kits, model.declared))
+    yield from (f"is {problem}" for problem in _model_problems(model))
 
 
 def _wrong_rule(data: Mapping[str, Any], kits: Collection[str]) -> Iterator[str]:
@@ -533,7 +533,7 @@ def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                 value = entity.model if bad.value is ABSENT else bad.value
                 yield Finding((*place, "model"), bad.problem, value, bad.nearest)
                 continue
-            for what in (*_needs_kit(model, kits, with_article(section[:-1])), *_model_problems(model, kits, having)):
+            for what in (*_needs_kit(model, kits, with_article(section[:-1])), *_model_problems(model)):
                 yield Finding((*place, "model"), what, entity.model)
             for of, label, settings in _components_of(entity):
                 key = (id(model) if model.declared is not None else id(entity)), id(settings)
@@ -562,17 +562,17 @@ def _needs_kit(form: ComponentType, kits: Collection[str], noun: str = "") -> It
         yield f"{noun or word_of(form.type_name)} of {with_article(form.kit)} in a world without one"
 
 
-def _model_problems(model: Model, kits: Collection[str], has: Mapping[str, int] | None) -> Iterator[str]:
-    """Yield why entities of a model would not be solved in a world with these kits.
-
-    `has` are the fields of its state; where they are not known nothing is missing.
-    """
+def _model_problems(model: Model) -> Iterator[str]:
+    """Yield why entities of a model would not be solved."""
     if model.is_rigid and not model.couples and model.name not in REACHED:
         yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
 
 
 def _component_problems(form: ComponentType, model: Model, has: Mapping[str, int] | None) -> Iterator[str]:
-    """Yield the needs of a component or rule that a robot of a model does not meet; `has` as above."""
+    """Yield the needs of a component or rule that a robot of a model does not meet.
+
+    `has` are the fields of its state; where they are not known nothing is missing.
+    """
     word = word_of(form.type_name)
     needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
     if isinstance(form, Component) and (field := _trigger_of_model(form)) and field not in needs:

@@ -8,7 +8,7 @@ the outline of its hull. Fixed shapes are painted once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor, inf
+from math import inf
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -84,11 +84,6 @@ class OverheadPainter:
             self._ground[one.places[seen]] = one.colours[seen]
             self._heights[one.places[seen]] = one.heights[seen]
 
-    def pixel(self, x: float, y: float) -> tuple[int, int]:
-        """Return column and row of the pixel that shows a place (m), whether it is within the picture or not."""
-        view = self.view
-        return floor((x - view.left) * view.scale), floor((view.top - y) * view.scale)
-
     def paint(self, frame: Frame) -> Picture:
         """Return the picture of a frame of the layout: uint8, of the shape (height, width, 3), red, green and blue.
 
@@ -111,14 +106,14 @@ def _standing(scene: Scene) -> Region:
     boxes = [shape_box(shape) for shape in scene.scenery]
     boxes = [box for box in boxes if box[1][2] > STANDING_M]
     if not boxes:
-        boxes = [swept_box(body) for body in scene.bodies.values() if not body.is_free and _has_shapes(body)]
+        boxes = [
+            swept_box(body)
+            for body in scene.bodies.values()
+            if not body.is_free and any(link.shapes for link in body.links)
+        ]
     if not boxes:
         return -SIDE_M / 2, -SIDE_M / 2, SIDE_M / 2, SIDE_M / 2
     (low_x, low_y, _), (high_x, high_y, _) = enclosing(boxes)
     x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
     across, along = (max(side * MARGIN / 2, STANDING_M) for side in (high_x - low_x, high_y - low_y))
     return x - across, y - along, x + across, y + along
-
-
-def _has_shapes(body: Body) -> bool:
-    return any(link.shapes for link in body.links)

@@ -80,7 +80,7 @@ class Shapes:
         )
         """The axes of each shape in the frame of its link."""
         self._colours = _colours([shape for _, shape in shapes])
-        self._boxes = _grouped(shapes, _box_size)
+        self._boxes = _grouped(shapes, lambda shape: shape.geometry.half if isinstance(shape.geometry, Box) else None)
         self._rounds = _grouped(shapes, _round_size)
         self._corners = [
             (number, _faces(shape)[0])
@@ -189,10 +189,6 @@ def _grouped(
         _Group(np.array([number for number, _ in those], np.intp), np.array([size for _, size in those]))
         for _, those in sorted(found.items())
     ]
-
-
-def _box_size(shape: Shape) -> tuple[float, float, float] | None:
-    return shape.geometry.half if isinstance(shape.geometry, Box) else None
 
 
 def _round_size(shape: Shape) -> tuple[float, float, float] | None:

@@ -18,16 +18,17 @@ from foosim.client.errors import PlayerError, Unanswered
 from foosim.client.loading import load_player
 from foosim.client.playing import PlayerLoop, report_failure
 from foosim.common import limits
+from foosim.common.json_text import encode_json
 from foosim.node.engines_pool import Solver
 from foosim.protocol import channels
 from foosim.protocol.actions import Journal, Log, Publish
 from foosim.protocol.channels import Channel
+from foosim.protocol.codec import decode, encode
 from foosim.protocol.fingerprint import library_fingerprint
-from foosim.protocol.messages import Epoch
+from foosim.protocol.messages import Answer, Epoch, Inquiry, Request
 from foosim.runtime.roles.bus import Bus, Message
 from foosim.simulation.failures import Stuck
 from foosim.simulation.journals import Ending, HubJournal
-from foosim.simulation.people import OPERATOR, People
 from foosim.simulation.settings import AtWork, Clock, Process, Settings, Traced
 from foosim.supervisor.records import fold
 from foosim.supervisor.settings import RunSettings
@@ -37,11 +38,65 @@ from foosim.world.frame import Frame
 
 __all__ = ["IDLE_NS_MAX", "OPERATOR", "Settings", "Stuck", "System"]
 
+OPERATOR: Final = "operator"
 NEVER_NS: Final = limits.COUNTER_MAX
 IDLE_NS_MAX: Final = 60_000_000_000
 """Virtual time without a commit after which a rehearsal is stuck: a fault of ours."""
 HUB_BACK_NS: Final = 300_000_000
 """Time after which a vHub that ended is restarted, as by a launcher."""
+
+
+class People:
+    """Operators and viewers of a rehearsal: requests to the supervisor, sent once or repeated until answered.
+
+    `later(after_ns, action)` schedules a repetition.
+    """
+
+    def __init__(self, bus: Bus, later: Callable[[int, Callable[[], object]], None]) -> None:
+        self.answers: dict[str, Answer] = {}
+        self.verbs: dict[str, str] = {}
+        """The verb of each request that was not given up, by id."""
+        self._bus = bus
+        self._later = later
+        self._requests = 0
+        self.viewed: list[bytes] = []
+        """The views received, in order of arrival."""
+        bus.subscribe(OPERATOR, (*channels.OPERATOR_READS, *channels.VIEW_READS))
+
+    def request(
+        self, verb: str, again_ns: int, arguments: dict[str, Any], who: str = OPERATOR, *, only_looks: bool = False
+    ) -> str:
+        """Send a request, every `again_ns` until it is answered (0: once); return the request's id.
+
+        With `only_looks` it is sent as a viewer's.
+        """
+        self._requests += 1
+        identity = f"request-{self._requests}"
+        self.verbs[identity] = verb
+        kind, channel = (Inquiry, channels.INQUIRY) if only_looks else (Request, channels.REQUEST)
+        self._bus.subscribe(who, channels.OPERATOR_READS)
+        self._send(identity, channel, who, encode(kind(who, identity, verb, encode_json(arguments))), again_ns)
+        return identity
+
+    def give_up(self, verb: str) -> None:
+        """Stop repeating unanswered requests."""
+        for identity in [known for known, what in self.verbs.items() if what == verb and known not in self.answers]:
+            self.verbs.pop(identity)
+
+    def hear(self, channel: Channel, payload: bytes) -> None:
+        """Handle an answer or a view."""
+        if channel is channels.VIEW:
+            self.viewed.append(payload)
+        elif channel is channels.ANSWER:
+            answer = decode(Answer, payload)
+            self.answers[answer.id] = answer
+
+    def _send(self, identity: str, channel: Channel, who: str, payload: bytes, again_ns: int) -> None:
+        if identity in self.answers or identity not in self.verbs:
+            return
+        self._bus.put(who, channel, who, payload, self._bus.now_ns)
+        if again_ns:
+            self._later(again_ns, lambda: self._send(identity, channel, who, payload, again_ns))
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)

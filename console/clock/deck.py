@@ -9,11 +9,13 @@ from __future__ import annotations
 import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from fractions import Fraction
+from math import ceil
 from typing import Any, Final
 
 from foosim.common.errors import BadValue, show
 from foosim.common.names import nearest_name
-from foosim.console.clock.playhead import Playhead
+from foosim.common.units import Pace, parse_pace
 from foosim.console.shown.source import Answered, InvalidRequest
 
 Known = Mapping[str, Mapping[str, tuple[type, ...]]]
@@ -26,9 +28,10 @@ ARGUMENTS: Final[Known] = {
     "rate": {"pace": (str,)},
     "loop": {"on": (bool,)},
 }
-"""The requests of a playhead, with the arguments of each."""
+"""The requests of a deck, with the arguments of each."""
 VERBS: Final = tuple(ARGUMENTS)
 UNITS: Final = ("ticks", "frames")
+STEP_MAX: Final = 1_000_000
 
 
 class Clock(ABC):
@@ -38,19 +41,12 @@ class Clock(ABC):
         """`tick_ns`: of the first source. `clock_ns` is a monotonic wall clock."""
         self.tick_ns = tick_ns
         self.clock_ns: Final = clock_ns
+        self.paused = True
+        self.jumps = 0
+        """How often time has jumped: paths are cut where this changes."""
         self.changes = 0
         """How often it has changed otherwise than by time that passes."""
         self._waiting: set[asyncio.Event] = set()
-
-    @property
-    @abstractmethod
-    def jumps(self) -> int:
-        """How often time has jumped: paths are cut where this changes."""
-
-    @property
-    @abstractmethod
-    def paused(self) -> bool:
-        """Whether time is paused."""
 
     @abstractmethod
     def time_ns(self) -> int:
@@ -60,9 +56,9 @@ class Clock(ABC):
     def wall_ns(self, time_ns: int) -> int | None:
         """Return the wall time at which a simulated time is reached; None where it is paused, or not known."""
 
-    @abstractmethod
     def account(self) -> dict[str, Any]:
         """Return its part of a status."""
+        return {"state": "paused" if self.paused else "running"}
 
     def changed(self) -> None:
         """Wake the waiters: a request was done, the ends have changed, or time has been set."""
@@ -87,30 +83,63 @@ class Clock(ABC):
 
 
 class Deck(Clock):
-    """A playhead in ticks of the first source."""
+    """The position in a recording from tick `first` to `last`: playing, paused, stepped, sought, looped, at a rate.
 
-    def __init__(self, playhead: Playhead, tick_ns: int, clock_ns: Callable[[], int]) -> None:
-        """`clock_ns` is a monotonic wall clock."""
+    It starts paused at the first tick. A position is a tick, with a fraction while it plays.
+    """
+
+    def __init__(self, first: int, last: int, tick_ns: int, clock_ns: Callable[[], int]) -> None:
         super().__init__(tick_ns, clock_ns)
-        self.playhead: Final = playhead
-
-    @property
-    def jumps(self) -> int:
-        return self.playhead.jumps
-
-    @property
-    def paused(self) -> bool:
-        return self.playhead.paused
+        self.first, self.last = first, last
+        self.pace = Pace("realtime")
+        self.loops = False
+        self._at = Fraction(first)
+        """Position at the anchor."""
+        self._anchor_ns = 0
+        """Wall time of it, while it plays."""
 
     def time_ns(self) -> int:
-        return self.playhead.tick(self.clock_ns()) * self.tick_ns
+        return self.tick() * self.tick_ns
 
     def wall_ns(self, time_ns: int) -> int | None:
-        return self.playhead.wall_ns(-(-time_ns // self.tick_ns))
+        if self.paused:
+            return None
+        tick = -(-time_ns // self.tick_ns)
+        return self._anchor_ns + ceil((tick - self._at) * self.tick_ns / self.pace.factor)
 
     def account(self) -> dict[str, Any]:
-        head = self.playhead
-        return {"state": "paused" if head.paused else "running", "pace": str(head.pace), "loop": head.loops}
+        return {**super().account(), "pace": str(self.pace), "loop": self.loops}
+
+    def tick(self) -> int:
+        """Return the tick that was reached; at its end a recording begins again or pauses."""
+        return int(self._advance())
+
+    def _advance(self) -> Fraction:
+        if self.paused:
+            return self._at
+        now_ns = self.clock_ns()
+        at = self._at + max(0, now_ns - self._anchor_ns) * self.pace.factor / self.tick_ns
+        if at < self.last:
+            return at
+        if not self.loops or self.first == self.last:
+            self._at, self.paused = Fraction(self.last), True
+            return self._at
+        self.jumps += 1
+        self._at, self._anchor_ns = self.first + (at - self.last) % (self.last - self.first), now_ns
+        return self._at
+
+    def _anchor(self, at: Fraction | int) -> None:
+        self._at, self._anchor_ns = Fraction(at), self.clock_ns()
+
+    def grow(self, first: int, last: int) -> None:
+        """Take other ends: a recording that is still being written has grown, or let its oldest files go."""
+        at = self._advance()
+        self.first, self.last = first, last
+        self.jumps += at < first
+        self._anchor(min(max(at, Fraction(first)), Fraction(last)))
+        self.changed()
+
+    # --- requests ----------------------------------------------------------------------------------------------------
 
     def request(
         self, verb: str, arguments: Mapping[str, Any], neighbour: Callable[[int, bool], int | None]
@@ -120,42 +149,70 @@ class Deck(Clock):
         Raises InvalidRequest for an unknown verb, BadValue for wrong arguments.
         """
         checked(verb, arguments)
-        head, now_ns = self.playhead, self.clock_ns()
         if verb in ("play", "resume"):
-            head.play(now_ns)
+            self._play()
         elif verb == "pause":
-            head.pause(now_ns)
+            self._pause()
         elif verb == "step":
-            self._step(arguments, now_ns, neighbour)
+            self._step(arguments.get("count", 1), arguments.get("unit", "ticks"), neighbour)
         elif verb == "seek":
-            head.seek(needed(verb, arguments, "tick"), now_ns)
+            self._seek(needed(verb, arguments, "tick"))
         elif verb == "rate":
-            head.set_rate(needed(verb, arguments, "pace"), now_ns)
+            self._set_rate(needed(verb, arguments, "pace"))
         else:
-            head.loops = needed(verb, arguments, "on")
+            self.loops = needed(verb, arguments, "on")
         self.changed()
-        return Answered(self._text(verb, now_ns), head.tick(now_ns))
+        return Answered(self._text(verb), self.tick())
 
-    def _step(self, arguments: Mapping[str, Any], now_ns: int, neighbour: Callable[[int, bool], int | None]) -> None:
-        count, unit = arguments.get("count", 1), arguments.get("unit", "ticks")
+    def _play(self) -> None:
+        """Play; at the end, from the beginning."""
+        if self.paused:
+            if self._at >= self.last:
+                self._seek(self.first)
+            self.paused = False
+            self._anchor(self._at)
+
+    def _pause(self) -> None:
+        """Pause, at a whole tick."""
+        self._at, self.paused = Fraction(self.tick()), True
+
+    def _seek(self, tick: int) -> None:
+        if not self.first <= tick <= self.last:
+            raise BadValue(f"seek: not a tick of the recording, which has {self.first} to {self.last}", tick)
+        self.jumps += 1
+        self._anchor(tick)
+
+    def _step(self, count: int, unit: str, neighbour: Callable[[int, bool], int | None]) -> None:
+        """Go some ticks or recorded moments forward, or back where negative, as far as there are any; pause there."""
         if unit not in UNITS:
             raise BadValue(f"step: a unit is {' or '.join(UNITS)}", unit, nearest_name(unit, UNITS))
         if unit == "frames":
-            here = self.playhead.tick(now_ns)
+            here = self.tick()
             there = neighbour(here, count > 0)
             count = (there - here) if there is not None else 0
             if not count:
                 raise BadValue(f"step: nothing is recorded {'after' if there is None else 'at'} tick {here}")
-        self.playhead.step(count, now_ns)
+        if not count or abs(count) > STEP_MAX:
+            raise BadValue(f"step: a count out of range 1 to {STEP_MAX}, or negative to go back", count)
+        self._pause()
+        self.jumps += count < 0
+        self._at = Fraction(min(max(int(self._at) + count, self.first), self.last))
 
-    def _text(self, verb: str, now_ns: int) -> str:
-        head = self.playhead
-        where = f"tick {head.tick(now_ns)}, {head.tick(now_ns) * self.tick_ns / 1e9:g} s"
+    def _set_rate(self, text: str) -> None:
+        """Continue at another rate. Raises BadValue: a page has no `fast`."""
+        pace = parse_pace(text)
+        if pace.kind == "fast":
+            raise BadValue("rate: a recording is shown at realtime or a factor such as 8x", text)
+        self._anchor(self._advance())
+        self.pace = pace
+
+    def _text(self, verb: str) -> str:
+        where = f"tick {self.tick()}, {self.time_ns() / 1e9:g} s"
         if verb == "rate":
-            return f"at {head.pace} from {where} on"
+            return f"at {self.pace} from {where} on"
         if verb == "loop":
-            return "begins again at its end" if head.loops else "pauses at its end"
-        return f"{'paused' if head.paused else 'plays'} at {where}"
+            return "begins again at its end" if self.loops else "pauses at its end"
+        return f"{'paused' if self.paused else 'plays'} at {where}"
 
 
 def checked(verb: str, arguments: Mapping[str, Any], known: Known = ARGUMENTS) -> None:

@@ -10,8 +10,8 @@ from math import isnan
 from typing import Any
 
 from foosim.console.clock.deck import Clock
-from foosim.console.shown.compare import Positions
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Source, Wanted
+from foosim.console.shown.tracks import Positions
 
 
 class HeardClock(Clock):
@@ -19,30 +19,19 @@ class HeardClock(Clock):
 
     def __init__(self, tick_ns: int, clock_ns: Callable[[], int]) -> None:
         super().__init__(tick_ns, clock_ns)
-        self._time_ns, self._jumps, self._paused = 0, 0, True
+        self._time_ns = 0
 
     def heard(self, moment: Moment) -> None:
         """Take the time of a moment."""
-        self._time_ns, self._paused = round(moment.tick * self.tick_ns), moment.paused
-        self._jumps += moment.jump
+        self._time_ns, self.paused = round(moment.tick * self.tick_ns), moment.paused
+        self.jumps += moment.jump
         self.changed()
-
-    @property
-    def jumps(self) -> int:
-        return self._jumps
-
-    @property
-    def paused(self) -> bool:
-        return self._paused
 
     def time_ns(self) -> int:
         return self._time_ns
 
     def wall_ns(self, time_ns: int) -> int | None:
         return None
-
-    def account(self) -> dict[str, Any]:
-        return {"state": "paused" if self._paused else "running"}
 
 
 class Leader:
@@ -58,13 +47,15 @@ class Leader:
         self._places: dict[str, int] = {}
         """The rows of poses by the names of links, and by those of entities, whose last link it is."""
         self._moment: Moment | None = None
+        self._feed: Feed
 
     @property
     def about(self) -> About:
         return self.source.about
 
     async def run(self, feed: Feed) -> None:
-        await self.source.run(_Overheard(self, feed))
+        self._feed = feed
+        await self.source.run(self)
 
     def want(self, wanted: Wanted) -> None:
         self.gaps += not (self._is_looked_at and wanted.readers)
@@ -77,19 +68,25 @@ class Leader:
     async def history(self, curve: Curve) -> tuple[str, str, list[tuple[float, float]]]:
         return await self.source.history(curve)
 
-    def described(self, about: About, scene: Mapping[str, Any]) -> None:
-        """Take the scene, in whose order poses come, and the length of a tick."""
+    # --- the feed of its source: followers get messages later than the leader's own feed -----------------------------
+
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
+        """Forward the scene, in whose order poses come, and take the length of a tick."""
+        self._feed.describe(about, scene)
         self.clock.tick_ns = about.tick_ns
         links = [link["name"] for link in scene["links"]]
         self._places = {name: row for row, name in enumerate(links)}
         self._places |= {body["name"]: body["links"][-1] for body in scene["bodies"] if body["links"]}
         self._moment = None
 
-    def shown(self, moment: Moment) -> None:
-        """Take a moment."""
+    def show(self, moment: Moment) -> None:
+        self._feed.show(moment)
         self.gaps += moment.jump
         self._moment = moment
         self.clock.heard(moment)
+
+    def publish(self, message: Mapping[str, Any]) -> None:
+        self._feed.publish(message)
 
     def seen(self) -> tuple[int, Positions] | None:
         """Return time, ns, and poses of the newest moment; None before there is one."""
@@ -100,21 +97,3 @@ class Leader:
         places = ((name, rows[row]) for name, row in self._places.items())
         poses = {name: (tuple(pose[:3]), tuple(pose[3:])) for name, pose in places if not isnan(pose[0])}
         return self.clock.time_ns(), poses
-
-
-class _Overheard:
-    """A feed that forwards messages and then reports them to the leader, so that followers get them later."""
-
-    def __init__(self, leader: Leader, feed: Feed) -> None:
-        self._leader, self._feed = leader, feed
-
-    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
-        self._feed.describe(about, scene)
-        self._leader.described(about, scene)
-
-    def show(self, moment: Moment) -> None:
-        self._feed.show(moment)
-        self._leader.shown(moment)
-
-    def publish(self, message: Mapping[str, Any]) -> None:
-        self._feed.publish(message)

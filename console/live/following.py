@@ -66,7 +66,9 @@ class Following:
         self._world: World | None = None
         self._is_paused = self._has_changed = False
         self._wanted = Wanted()
-        self._marks = StatusMarks()
+        self._recoveries = 0
+        self._marked: set[tuple[Any, ...]] = set()
+        """The recoveries and the requests that are marked."""
         self._statuses = 0
         self._disturbers: dict[int, str] = {}
         """The requester of an event of the network, by the tick from which it applies."""
@@ -195,7 +197,7 @@ class Following:
         was_paused, self._is_paused = self._is_paused, status["state"] == "paused"
         self._has_changed = was_paused != self._is_paused
         messages: list[dict[str, Any]] = [{"type": "status", "status": status}]
-        marks = self._marks.new(status)
+        marks = self._new_marks(status)
         while world.planned and world.planned[-1].at_ns <= status["ticks"] * status["tick_ns"]:
             event = world.planned.pop()
             marks.append(asdict(Mark(event.at_ns // status["tick_ns"], NETWORK, event_words(event))))
@@ -212,6 +214,21 @@ class Following:
         for message in messages:
             world.history.keep(message)
         return messages
+
+    def _new_marks(self, status: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return the marks that a status adds: losses and returns, requests, each once."""
+        marks = []
+        for entry in status["recoveries"][self._recoveries :]:
+            if entry["outage_ms"] is None:
+                break  # it is marked when it has ended
+            marks.append({"tick": entry["tick"], "kind": "recovery", "text": recovery_text(entry)})
+            self._recoveries += 1
+        requests = [(one["tick"], one["verb"], one["text"], one["who"]) for one in status["requests"]]
+        for tick, verb, text, who in requests:
+            if (tick, verb, text, who) not in self._marked:
+                marks.append({"tick": tick, "kind": "request", "text": f"{who}: {text}"})
+        self._marked = set(requests)
+        return marks
 
     def explained(self, status: Mapping[str, Any], wanted: Wanted) -> list[dict[str, Any]]:
         """Return the messages about links that are watched. It takes a while: for a thread."""
@@ -239,26 +256,3 @@ def first_frame(drawing: Drawing, what: Mapping[str, Any]) -> Frame | None:
 def _frame_of(drawing: Drawing, commit: Commit) -> Frame:
     """Return the frame of a commit. Raises Malformed."""
     return frame_from_bytes(commit.tick, drawing.layout, commit.values, commit.outboxes)
-
-
-class StatusMarks:
-    """Marks on the time line from statuses: losses and returns, requests, each once."""
-
-    def __init__(self) -> None:
-        self._recoveries = 0
-        self._requests: set[tuple[Any, ...]] = set()
-
-    def new(self, status: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the marks that a status adds."""
-        marks = []
-        for entry in status["recoveries"][self._recoveries :]:
-            if entry["outage_ms"] is None:
-                break  # it is marked when it has ended
-            marks.append({"tick": entry["tick"], "kind": "recovery", "text": recovery_text(entry)})
-            self._recoveries += 1
-        requests = [(one["tick"], one["verb"], one["text"], one["who"]) for one in status["requests"]]
-        for tick, verb, text, who in requests:
-            if (tick, verb, text, who) not in self._requests:
-                marks.append({"tick": tick, "kind": "request", "text": f"{who}: {text}"})
-        self._requests = set(requests)
-        return marks

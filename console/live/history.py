@@ -127,17 +127,14 @@ class History:
         """Record a message of `status`, `links` or `readings`."""
         kind = message["type"]
         if kind == "status":
-            self._keep_status(message["status"])
+            status, before = message["status"], self._statuses.newest or {}
+            if self._statuses.is_due(status["ticks"], len(before)):
+                numbers = dict(_numbers(status, ""))
+                self._statuses.keep(status["ticks"], _places(before, numbers), [*numbers.values()])
         elif kind == "links":
             self._keep_links(message["at"], message["links"])
         elif kind == "readings":
             self._keep_readings((message["robot"], message["channel"]), message["points"])
-
-    def _keep_status(self, status: Mapping[str, Any]) -> None:
-        before: Mapping[str, int] = self._statuses.newest or {}
-        if self._statuses.is_due(status["ticks"], len(before)):
-            numbers = dict(_numbers(status, ""))
-            self._statuses.keep(status["ticks"], _places(before, numbers), [*numbers.values()])
 
     def _keep_links(self, tick: int, links: list[Mapping[str, Any]]) -> None:
         if not self._links.is_due(tick, len(links) * len(FIGURES)):

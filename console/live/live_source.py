@@ -9,6 +9,7 @@ waits for another's answer.
 from __future__ import annotations
 
 import asyncio
+import shlex
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -16,16 +17,19 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from foosim.capture.parts import is_complete
 from foosim.client.control import Control, NoAnswer, RequestRefused
 from foosim.common.errors import BadValue, Refused
 from foosim.console.live.following import Following, World, first_frame
-from foosim.console.live.presence import HERE, away
 from foosim.console.live.sending import VERBS as JOB_VERBS
 from foosim.console.live.sending import Join, Sending
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
+from foosim.launcher.outcome import ended_outcome
+from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.world.frame import Frame
 
@@ -148,7 +152,7 @@ class LiveSource:
                     continue
                 if trouble:
                     trouble, self._has_ended = "", False
-                    feed.publish(HERE)
+                    feed.publish({"type": "presence", "state": "here", "text": ""})
                     feed.publish(_note("info", f"connected to {self._name} again"))
                 try:
                     await self._follow(control, feed)
@@ -174,7 +178,7 @@ class LiveSource:
     async def _report_away(self, feed: Feed, text: str) -> None:
         """Report once that the run is away, or that it has ended."""
         if not await self._report_end(feed):
-            feed.publish(away(text))
+            feed.publish({"type": "presence", "state": "away", "text": text})
             feed.publish(_note("warning", text))
 
     async def _report_end(self, feed: Feed) -> bool:
@@ -303,3 +307,26 @@ class _Newest(Inbox):
 
 def _note(level: str, text: str) -> dict[str, Any]:
     return {"type": "note", "level": level, "text": text}
+
+
+def how_ended(folder: RunFolder, stopped_by: str) -> dict[str, Any] | None:
+    """Return the message about a run that has a result, with reason and capture; None for a run that continues or may
+    be resumed. `stopped_by` is the requester of the end, if known.
+    """
+    if folder.result() is None:
+        return None
+    result = ended_outcome(folder).result
+    reason, failed, capture = result["reason"], bool(result["failed"]), result["capture"]
+    if stopped_by and reason == "stopped":
+        reason = f"stopped by {stopped_by}"
+    command = "" if capture is None else f"foosim view {shlex.quote(capture)}"
+    text = f"The run has {'failed' if failed else 'ended'} at tick {result['ticks']}: {reason}. "
+    if capture is None:
+        text += "It has no capture."
+    else:
+        state = "" if is_complete(Path(capture)) else " (unfinished)"
+        text += f"Its capture is {capture}{state}; this shows it: {command}"
+    return {
+        "type": "presence", "state": "ended", "failed": failed, "reason": reason, "capture": capture,
+        "command": command, "text": text,
+    }  # fmt: skip

@@ -1,1 +1,1 @@
-"""What is recorded as a source of the page: captures, replays, recorded poses, on one playhead."""
+"""What is recorded as a source of the page: captures, replays, recorded poses, on one clock."""

@@ -7,6 +7,8 @@ open by itself. A capture that is still being written is looked at again every s
 from __future__ import annotations
 
 import asyncio
+import os
+import shlex
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -16,20 +18,20 @@ from typing import Any, Final, TypeVar
 
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import CapturedTick
-from foosim.capture.rows import CLIENTS, PACKETS
-from foosim.common.errors import Refused
+from foosim.capture.rows import CLIENTS, FRAME, PACKETS
+from foosim.common.errors import BadValue, Refused
+from foosim.common.units import format_ns
 from foosim.console.clock.comparing import Compare, compare
 from foosim.console.clock.deck import ARGUMENTS, VERBS, Clock, Deck, checked
-from foosim.console.clock.playhead import Playhead
-from foosim.console.recorded.branch_text import branch_answer
 from foosim.console.recorded.capture_curves import curve_points, reading_points, status_at
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.recording import Look, Recording
-from foosim.console.recorded.whereabouts import Whereabouts
-from foosim.console.shown.compare import Where
 from foosim.console.shown.curves import name_and_unit
-from foosim.console.shown.links import Links, lost_where
+from foosim.console.shown.links import Links, links_message
 from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.console.shown.tracks import Where
+from foosim.deployment.loader import load_deployment
+from foosim.deployment.text.files import read_source_file
 from foosim.world.frame import Frame
 
 T = TypeVar("T")
@@ -69,7 +71,7 @@ class FileSource:
         self._deck: Deck | None = None
         """The clock, where it is this capture's own."""
         if clock is None:
-            clock = self._deck = Deck(Playhead(first, last, tick_ns), tick_ns, time.monotonic_ns)
+            clock = self._deck = Deck(first, last, tick_ns, time.monotonic_ns)
         self.clock: Final = clock
         self.offset_ns: Final = offset_ns
         verbs = (*VERBS, BRANCH) if self._deck is not None else (BRANCH,)
@@ -109,7 +111,12 @@ class FileSource:
 
     def opened(self, *, links: bool = False) -> Callable[[], Where]:
         """Return a function that opens the capture once more, for a comparison in a thread of its own."""
-        return lambda: Whereabouts(Recording(self.recording.path), self.offset_ns, links=links)
+
+        def open_again() -> Where:
+            recording = Recording(self.recording.path)
+            return lambda time_ns: recording.poses_at(time_ns + self.offset_ns, links=links)
+
+        return open_again
 
     def covers(self) -> tuple[int, int]:
         """Return the first and the last tick of the clock at which there is something."""
@@ -205,7 +212,8 @@ class FileSource:
 
     async def _gather(self, feed: Feed) -> None:
         """Read events, slice by slice, and publish the marks as they are found."""
-        history = await self._in(self._back, self._open_history)
+        path, topics = self.recording.path, (PACKETS, CLIENTS)
+        history = await self._in(self._back, lambda: CaptureHistory(Recording(path, topics)))
         is_reported = False
         while True:
             try:
@@ -227,9 +235,6 @@ class FileSource:
                 await asyncio.sleep(REFRESH_S)
                 await self._in(self._back, history.refresh)
 
-    def _open_history(self) -> CaptureHistory:
-        return CaptureHistory(Recording(self.recording.path, (PACKETS, CLIENTS)))
-
     async def _refresh(self, feed: Feed) -> None:
         """Read the growing file until the capture is finished."""
         while not self.recording.index.finished:
@@ -243,8 +248,7 @@ class FileSource:
             first, last = self.recording.span
             self.about = replace(self.about, span=(first, last))
             if self._deck is not None:
-                self._deck.playhead.grow(first, last, self._deck.clock_ns())
-                self._deck.changed()
+                self._deck.grow(first, last)
             self._describe(feed)
 
     async def _publish_status(self, feed: Feed) -> None:
@@ -280,24 +284,12 @@ class FileSource:
     def _link_messages(self, history: CaptureHistory, tick: int) -> list[dict[str, Any]]:
         at_ns = tick * self.recording.tick_ns
         continues = at_ns - WINDOW_NS < self._sent_ns <= at_ns
-        drops = [
-            {"from": key[0], "to": key[1], "cause": cause, "where": lost_where(cause), "count": count}
-            for key, cause, count in history.links.drops(self._sent_ns if continues else at_ns - WINDOW_NS, at_ns)
-        ]
+        drops = history.links.drops(self._sent_ns if continues else at_ns - WINDOW_NS, at_ns)
         frame = history.recording.frame_up_to(tick)
         if frame is not None:
             self._ends.move(frame)
         links = self._ends.with_ends(history.links.windows(at_ns, WINDOW_NS))
-        messages: list[dict[str, Any]] = [
-            {
-                "type": "links",
-                "at": tick,
-                "window_s": WINDOW_NS / 1e9,
-                "in_all": len(links),
-                "links": links,
-                "drops": drops,
-            }
-        ]
+        messages = [links_message(tick, WINDOW_NS / 1e9, len(links), links, drops)]
         for source, destination in self._wanted.links:
             messages.append({"type": "watched", **history.watched(source, destination, at_ns)})
         after_ns = self._sent_ns if continues else at_ns - WINDOW_NS // 10
@@ -328,3 +320,37 @@ class FileSource:
         except CaptureError:  # the pass over the whole capture reports it
             points = []
         return name, unit, points
+
+
+def branch_answer(recording: Recording, tick: int) -> Answered:
+    """Return the command that continues from a tick; its tick is that of the captured frame that the run begins with.
+
+    After a `#` it warns that the deployment's file is not the captured one. Raises BadValue for a tick without a frame
+    before it, CaptureError.
+    """
+    number = recording.index.places[FRAME].newest(tick * recording.tick_ns)
+    if number < 0:
+        first, last = recording.span
+        raise BadValue(f"branch: no captured frame at or before this tick; there are ticks {first} to {last}", tick)
+    row = recording.row(FRAME, number)
+    name = recording.about.deployment_name
+    time = format_ns(row.tick * recording.tick_ns).replace(" ", "")
+    command = ["foosim", "up", name, "--from", f"{_near(recording.path)}@{time}"]
+    return Answered(shlex.join(command) + _remark(recording, Path(name)), row.tick)
+
+
+def _near(path: Path) -> Path:
+    """Return a path for display: relative if it is below this folder."""
+    whole = Path(os.path.abspath(path))
+    return whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else whole
+
+
+def _remark(recording: Recording, file: Path) -> str:
+    """Return a note about the deployment's file, empty when it is the captured one."""
+    try:
+        there = load_deployment(read_source_file(file), str(file))
+    except Refused:
+        return f"  # {file} is not here: name the file that the run was started with"
+    if there.model_dump() != recording.deployment.model_dump():
+        return f"  # {file} is not what the run had: it was changed, or the run had options (--set)"
+    return ""

@@ -16,7 +16,6 @@ import numpy as np
 
 from foosim.console.clock.comparing import Compare, compare
 from foosim.console.clock.deck import VERBS, Clock, Deck
-from foosim.console.clock.playhead import Playhead
 from foosim.console.recorded.poses_csv import BadPoses, read_tracks
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import About, Answered, Curve, Feed, InvalidRequest, Moment, Wanted
@@ -69,8 +68,7 @@ class PosesSource:
         self._deck: Deck | None = None
         """The clock, where it is this table's own."""
         if clock is None:
-            head = Playhead(first_ns // TICK_NS, -(-last_ns // TICK_NS), TICK_NS)
-            clock = self._deck = Deck(head, TICK_NS, time.monotonic_ns)
+            clock = self._deck = Deck(first_ns // TICK_NS, -(-last_ns // TICK_NS), TICK_NS, time.monotonic_ns)
         self.clock: Final = clock
         first, last = ((time_ns - offset_ns) // clock.tick_ns for time_ns in (first_ns, last_ns))
         self._covers = first, last

@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -34,6 +35,7 @@ from foosim.capture.reader import (
 )
 from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
 from foosim.console.shown.drawing import Drawing
+from foosim.console.shown.tracks import GAP_NS, Pose, between, is_jump
 from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame
 
@@ -156,6 +158,39 @@ class Recording:
             if 0 <= number < len(places):
                 found.append(places.log_ns[number] // self.tick_ns)
         return (min(found) if later else max(found)) if found else None
+
+    def poses_at(self, time_ns: int, *, links: bool = False) -> dict[str, Pose]:
+        """Return the known pose of each entity (that of its last link), for comparisons; with `links` of links, too.
+
+        Positions between two captured moments that are close are interpolated, but not over a jump. Raises
+        CaptureError.
+        """
+        tick, rest_ns = divmod(time_ns, self.tick_ns)
+        first, last = self.span
+        look = self.look(tick) if first <= tick <= last else None
+        if look is None:
+            return {}
+        drawing = self.drawing
+        places = {**drawing.links, **drawing.entities} if links else drawing.entities
+
+        def known(look: Look) -> dict[str, Pose]:
+            rows = look.poses.tolist()
+            found = ((name, rows[place]) for name, place in places.items())
+            return {name: (tuple(row[:3]), tuple(row[3:])) for name, row in found if not isnan(row[0])}
+
+        if look.tick == tick and not rest_ns:
+            return known(look)
+        later = self.neighbour(tick, later=True)
+        after = None if later is None else self.look(later)
+        passed_ns = (after.tick - look.tick) * self.tick_ns if after is not None else 0
+        if after is None or not 0 < passed_ns <= GAP_NS:
+            return {}
+        share, ends = (time_ns - look.tick * self.tick_ns) / passed_ns, known(after)
+        return {
+            name: between(pose, ends[name], share)
+            for name, pose in known(look).items()
+            if name in ends and not is_jump(pose[0], ends[name][0], passed_ns)
+        }
 
     def _poses(self, number: int) -> NDArray[np.float32]:
         """Return captured poses in the order of the scene's links."""

@@ -27,9 +27,11 @@ PLOTTED: Final = frozenset({"status", "links", "readings"})
 
 
 @dataclass
-class SourceState:
-    """The last messages of one source."""
+class SourceFeed:
+    """The last messages of one source, and its feed (`source.Feed`): all that comes goes to the board's readers."""
 
+    board: Board
+    number: int
     about: About
     generation: int = 0
     described: Mapping[str, Any] = field(default_factory=dict)
@@ -46,6 +48,72 @@ class SourceState:
     """The last message about each watched link."""
     marks: list[Mapping[str, Any]] = field(default_factory=list)
 
+    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
+        changed, self.about = about != self.about, about
+        if changed:
+            for reader in self.board.readers.values():
+                reader.put_first("sources", self.board.welcome(reader, "sources"))
+        if scene == self.described:
+            return
+        self.generation += 1
+        self.described, self.shown = scene, None
+        self.links = len(scene["links"])
+        self.numbers = max((run["index"] + run["count"] for run in scene["fields"]), default=0)
+        self.scene = encode_json({"type": "scene", "source": self.number, "generation": self.generation, **scene})
+        self.kept.pop("overlay", None)
+        for reader in self.board.readers.values():
+            reader.put_first(("scene", self.number), self.scene)
+            reader.follows[self.number].fields = ()  # they were places in another world
+
+    def show(self, moment: Moment) -> None:
+        assert len(moment.poses) == self.links, f"{len(moment.poses)} poses of a scene of {self.links} links"
+        self.shown = Shown(self.number, self.generation, moment)
+        now_s = self.board.clock()
+        for reader in self.board.readers.values():
+            reader.show(self.shown, now_s)
+
+    def publish(self, message: Mapping[str, Any]) -> None:
+        kind = message["type"]
+        whole = {"source": self.number, **message}
+        if kind == "overlay":
+            whole["generation"] = self.generation
+        if kind == "marks":
+            self.marks += message["marks"]
+            del self.marks[:-MARKS_MAX]
+        text = b"" if kind == "readings" else encode_json(whole)
+        if kind in KEPT:
+            self.kept[kind] = text
+        if kind == "watched":
+            self.watched[message["link"][0], message["link"][1]] = text
+        if kind == "presence":
+            self.presence = message
+            self.warning = b""  # the warning was about this load
+        if kind == "note":
+            self.warning = b"" if message["level"] == "info" else text
+        for reader in list(self.board.readers.values()):
+            try:
+                self._send(reader, kind, whole, text)
+            except TooSlow as slow:
+                self.board.cut_off(reader, str(slow))
+
+    def _send(self, reader: Reader, kind: str, message: Mapping[str, Any], text: bytes) -> None:
+        """Send a reader a message, if it has subscribed, and the new points of its curves. Raises TooSlow."""
+        follows = reader.follows[self.number]
+        if kind == "watched":
+            if follows.link == tuple(message["link"]):
+                reader.put_newest((kind, self.number), text)
+        elif kind == "overlay":
+            if follows.overlays:
+                reader.put_newest((kind, self.number), text)
+        elif kind in KEPT:
+            reader.put_newest((kind, self.number), text)
+        elif kind != "readings":
+            reader.put(text)
+        if kind in PLOTTED and follows.curves:
+            series = points_of(follows.curves, message)
+            if series:
+                reader.put(encode_json({"type": "plotted", "source": self.number, "series": series}))
+
 
 class Board:
     """Distributes messages of sources to readers; all of it in one thread."""
@@ -61,13 +129,10 @@ class Board:
         self.sources = sources
         self.readers: dict[str, Reader] = {}
         """By name."""
-        self._version, self._clock, self._cut_off = version, clock, cut_off
-        self._states = [SourceState(source.about) for source in sources]
+        self.clock, self.cut_off = clock, cut_off
+        self._version = version
+        self.feeds = [SourceFeed(self, number, source.about) for number, source in enumerate(sources)]
         self._wanted = [Wanted() for _ in sources]
-
-    def feed(self, source: int) -> SourceFeed:
-        """Return the feed of a source."""
-        return SourceFeed(self, source)
 
     # --- browsers ----------------------------------------------------------------------------------------------------
 
@@ -75,12 +140,12 @@ class Board:
         """Serve one more browser: all that it needs to draw waits for it."""
         self.readers[reader.name] = reader
         reader.follows = {source: Follows() for source in range(len(self.sources))}
-        reader.put_first("sources", self._welcome(reader, "welcome"))
-        for source, state in enumerate(self._states):
+        reader.put_first("sources", self.welcome(reader, "welcome"))
+        for source, state in enumerate(self.feeds):
             if state.scene:
                 reader.put_first(("scene", source), state.scene)
             if state.shown is not None:
-                reader.show(state.shown, self._clock())
+                reader.show(state.shown, self.clock())
             for kind, message in state.kept.items():
                 reader.put_newest((kind, source), message)
             if state.marks:
@@ -102,7 +167,7 @@ class Board:
             follows.hz, follows.overlays = message.hz, frozenset(message.overlays)
         elif isinstance(message, Watch):
             follows.link = message.link
-            known = None if message.link is None else self._states[message.source].watched.get(message.link)
+            known = None if message.link is None else self.feeds[message.source].watched.get(message.link)
             if known is not None:
                 reader.put_newest(("watched", message.source), known)
         else:
@@ -110,16 +175,16 @@ class Board:
             new = tuple(curve for curve in curves if curve not in follows.curves)
             follows.curves = curves
             follows.fields = self._fields(message, curves)
-        shown = self._states[message.source].shown
+        shown = self.feeds[message.source].shown
         if shown is not None:  # a paused world shows no other one
             follows.next_s = 0.0
-            reader.show(shown, self._clock())
+            reader.show(shown, self.clock())
         self._look()
         return new
 
     def _fields(self, message: Plot, curves: Iterable[Curve]) -> tuple[int, ...]:
         """Return the numbers of the frame among curves. Raises Malformed for one that the frame does not have."""
-        state = self._states[message.source]
+        state = self.feeds[message.source]
         if not state.scene or message.generation not in (None, state.generation):
             return ()
         fields = tuple(curve.field for curve in curves if curve.field is not None)
@@ -134,7 +199,7 @@ class Board:
             raise Malformed(f"no source {source}: valid are 0 to {len(self.sources) - 1}")
         return source
 
-    def _welcome(self, reader: Reader, kind: str) -> bytes:
+    def welcome(self, reader: Reader, kind: str) -> bytes:
         sources = [
             {
                 "id": source,
@@ -144,7 +209,7 @@ class Board:
                 if state.about.span is None
                 else dict(zip(("first", "last"), state.about.span, strict=True)),
             }
-            for source, state in enumerate(self._states)
+            for source, state in enumerate(self.feeds)
         ]
         return encode_json(
             {"type": kind, "role": reader.role, "name": reader.name, "sources": sources, "version": self._version}
@@ -164,7 +229,7 @@ class Board:
                 tuple(links[:WATCHED_MAX]),
                 tuple(readings[:WATCHED_MAX]),
             )
-            watched = self._states[number].watched
+            watched = self.feeds[number].watched
             for link in [known for known in watched if known not in wanted.links]:
                 del watched[link]
             if wanted != self._wanted[number]:
@@ -173,91 +238,5 @@ class Board:
 
     def has_ended(self) -> str:
         """Return how the first source has ended; empty while it runs."""
-        presence = self._states[0].presence
+        presence = self.feeds[0].presence
         return str(presence["text"]) if presence.get("state") == "ended" else ""
-
-    # --- messages of sources -----------------------------------------------------------------------------------------
-
-    def describe(self, source: int, about: About, scene: Mapping[str, Any]) -> None:
-        state = self._states[source]
-        changed, state.about = about != state.about, about
-        if changed:
-            for reader in self.readers.values():
-                reader.put_first("sources", self._welcome(reader, "sources"))
-        if scene == state.described:
-            return
-        state.generation += 1
-        state.described, state.shown = scene, None
-        state.links = len(scene["links"])
-        state.numbers = max((run["index"] + run["count"] for run in scene["fields"]), default=0)
-        state.scene = encode_json({"type": "scene", "source": source, "generation": state.generation, **scene})
-        state.kept.pop("overlay", None)
-        for reader in self.readers.values():
-            reader.put_first(("scene", source), state.scene)
-            reader.follows[source].fields = ()  # they were places in another world
-
-    def show(self, source: int, moment: Moment) -> None:
-        state = self._states[source]
-        assert len(moment.poses) == state.links, f"{len(moment.poses)} poses of a scene of {state.links} links"
-        state.shown = Shown(source, state.generation, moment)
-        now_s = self._clock()
-        for reader in self.readers.values():
-            reader.show(state.shown, now_s)
-
-    def publish(self, source: int, message: Mapping[str, Any]) -> None:
-        state, kind = self._states[source], message["type"]
-        whole = {"source": source, **message}
-        if kind == "overlay":
-            whole["generation"] = state.generation
-        if kind == "marks":
-            state.marks += message["marks"]
-            del state.marks[:-MARKS_MAX]
-        text = b"" if kind == "readings" else encode_json(whole)
-        if kind in KEPT:
-            state.kept[kind] = text
-        if kind == "watched":
-            state.watched[message["link"][0], message["link"][1]] = text
-        if kind == "presence":
-            state.presence = message
-            state.warning = b""  # the warning was about this load
-        if kind == "note":
-            state.warning = b"" if message["level"] == "info" else text
-        for reader in list(self.readers.values()):
-            try:
-                self._send(reader, source, kind, whole, text)
-            except TooSlow as slow:
-                self._cut_off(reader, str(slow))
-
-    def _send(self, reader: Reader, source: int, kind: str, message: Mapping[str, Any], text: bytes) -> None:
-        """Send a reader a message, if it has subscribed, and the new points of its curves. Raises TooSlow."""
-        follows = reader.follows[source]
-        if kind == "watched":
-            if follows.link == tuple(message["link"]):
-                reader.put_newest((kind, source), text)
-        elif kind == "overlay":
-            if follows.overlays:
-                reader.put_newest((kind, source), text)
-        elif kind in KEPT:
-            reader.put_newest((kind, source), text)
-        elif kind != "readings":
-            reader.put(text)
-        if kind in PLOTTED and follows.curves:
-            series = points_of(follows.curves, message)
-            if series:
-                reader.put(encode_json({"type": "plotted", "source": source, "series": series}))
-
-
-class SourceFeed:
-    """The feed of one source: a `source.Feed`."""
-
-    def __init__(self, board: Board, source: int) -> None:
-        self._board, self._source = board, source
-
-    def describe(self, about: About, scene: Mapping[str, Any]) -> None:
-        self._board.describe(self._source, about, scene)
-
-    def show(self, moment: Moment) -> None:
-        self._board.show(self._source, moment)
-
-    def publish(self, message: Mapping[str, Any]) -> None:
-        self._board.publish(self._source, message)

@@ -135,9 +135,9 @@ class ConsoleServer:
 
     async def _run(self, number: int, source: Source) -> None:
         try:
-            await source.run(self.board.feed(number))
+            await source.run(self.board.feeds[number])
         except Refused as refused:
-            self.board.publish(number, {"type": "note", "level": "error", "text": str(refused)})
+            self.board.feeds[number].publish({"type": "note", "level": "error", "text": str(refused)})
 
     async def _take_leave(self) -> None:
         """Send all browsers the reason of the end: that of the source, or of this console alone."""

@@ -8,7 +8,7 @@ seconds of simulated time old. Pure.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import islice
@@ -142,10 +142,9 @@ class Links:
         seen = self._windows.take(at_s, counts, are_all=in_all == len(rows))
         self._look([key for key in rows if self._is_on_air(key)])
         links = [self._line(key, rows[key][7], count) for key, count in seen.items()]
-        window_s = round(self._windows.length_s, 1)
-        drops = _drops(self._windows.latest)
-        at = status["ticks"]
-        return {"type": "links", "at": at, "window_s": window_s, "in_all": in_all, "links": links, "drops": drops}
+        latest = self._windows.latest.items()
+        drops = ((key, cause, lost) for key, count in latest for cause, lost in count.causes.items())
+        return links_message(status["ticks"], round(self._windows.length_s, 1), in_all, links, drops)
 
     def _line(self, key: Key, queue_ns: int, count: Count) -> dict[str, Any]:
         source, destination, rule = key
@@ -241,22 +240,18 @@ def lost_where(cause: str) -> str:
     return "sender" if cause in AT_SENDER else "receiver" if cause in AT_RECEIVER else "way"
 
 
-def _drops(seen: Mapping[Key, Count]) -> list[dict[str, Any]]:
-    """Return the packets that were lost, by link and cause, and where that was."""
-    found: Counter[tuple[str, str, str]] = Counter()
-    for (source, destination, _), count in seen.items():
-        for cause, lost in count.causes.items():
-            found[source, destination, cause] += lost
-    return [
-        {
-            "from": source,
-            "to": destination,
-            "cause": cause,
-            "where": lost_where(cause),
-            "count": count,
-        }
-        for (source, destination, cause), count in found.items()
+def links_message(
+    at: int, window_s: float, in_all: int, links: list[dict[str, Any]], drops: Iterable[tuple[Key, str, int]]
+) -> dict[str, Any]:
+    """Return the message `links`; `drops` are the packets that were lost, by link and cause."""
+    lost: Counter[tuple[str, str, str]] = Counter()
+    for (source, destination, _), cause, count in drops:
+        lost[source, destination, cause] += count
+    shown = [
+        {"from": source, "to": destination, "cause": cause, "where": lost_where(cause), "count": count}
+        for (source, destination, cause), count in lost.items()
     ]
+    return {"type": "links", "at": at, "window_s": window_s, "in_all": in_all, "links": links, "drops": shown}
 
 
 def drop_message(tick: int, explained: Explained) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from foosim.world.components.view import ComponentError, called
 from foosim.world.forms.failures import ContractError
 from foosim.world.forms.forms import overrides
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, Layout
+from foosim.world.layout import Layout
 
 
 class Overlays:
@@ -26,10 +26,14 @@ class Overlays:
         self._failures: list[str] = []
         for robot in layout.robots:
             sensors = deployment.robots[robot.name].sensors.values()
-            if any(overrides(its.component_type.factory, "rays") for its in sensors):
-                for fitted in self._sensors_of(deployment, layout, robot):
+            if not any(overrides(its.component_type.factory, "rays") for its in sensors):
+                continue
+            try:
+                for fitted in sensors_of(deployment, layout, robot):
                     if overrides(type(fitted.sensor), "rays"):
                         self._groups.setdefault((type(fitted.sensor), fitted.size), []).append(fitted)
+            except ComponentError as error:
+                self._failures.append(str(error))
 
     def content(self, frame: Frame, wanted: Collection[str]) -> dict[str, Any]:
         """Return the content of the message `overlay` but for its source and generation."""
@@ -44,13 +48,6 @@ class Overlays:
         """Return which sensors have no rays from here on, and why; each once."""
         found, self._failures = self._failures, []
         return found
-
-    def _sensors_of(self, deployment: Deployment, layout: Layout, robot: Entity) -> Sequence[BoundSensor]:
-        try:
-            return sensors_of(deployment, layout, robot)
-        except ComponentError as error:
-            self._failures.append(str(error))
-            return ()
 
     def _contacts(self, frame: Frame) -> list[tuple[float, ...]]:
         """Return where free bodies touched something in the tick, and the impulse (N s)."""

@@ -2,12 +2,12 @@
 
 Between two samples a position is interpolated along a line and an orientation along the arc, but not over a gap and not
 over a jump: there nothing is known. Times are ns, positions m, orientations quaternions x, y, z, w, world frame.
-Pure: neighbours are `poses_csv`, `compare`.
+Pure: neighbours are `poses_csv`, `comparing`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import acos, dist, sin, sqrt
 from typing import Final
@@ -25,6 +25,9 @@ JUMP_M_S: Final = 20.0
 _NEARLY_PARALLEL: Final = 0.9995
 
 Pose = tuple[Vector, Quaternion]
+Positions = Mapping[str, Pose]
+Where = Callable[[int], Positions]
+"""Gives the known poses of a source at a time in ns, by entity."""
 
 
 def is_jump(before: Sequence[float], after: Sequence[float], passed_ns: int) -> bool:

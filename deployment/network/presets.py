@@ -6,20 +6,17 @@ The mark before a source says how far to trust it: [S] read in a standard's refe
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Sourced:
+class Sourced(NamedTuple):
     """A value as it is written in a file, and its source."""
 
     value: Any
     source: str
 
 
-def _v(value: Any, source: str) -> Sourced:
-    return Sourced(value, source)
+_v: Final = Sourced
 
 
 _NS3 = "[S] ns-3"

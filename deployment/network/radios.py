@@ -129,8 +129,7 @@ LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)
 
 def lora_longest(factor: object) -> int | None:
     """Return the longest payload of a spreading factor, in bytes; None for an unknown factor."""
-    is_factor = isinstance(factor, int) and 7 <= factor <= 12
-    return LORA_LONGEST[factor - 7] if isinstance(factor, int) and is_factor else None
+    return LORA_LONGEST[factor - 7] if isinstance(factor, int) and 7 <= factor <= 12 else None
 
 
 _PART_BY_PART = ("antenna", "path_loss", "shadowing", "queue")

@@ -138,7 +138,9 @@ class Expansion:
         others = {one for changes in made.values() for one in changes}
         for key, entry in section.values.items():
             if key in made and isinstance(entry, Fields):
-                raw, path = without(entry, EACH, COUNT, SPACING, *([SPARE] if _has_spares(entry) else [])), (name, key)
+                spare = entry.values.get(SPARE)
+                has_spares = spare is not None and not isinstance(plain(spare), bool)
+                raw, path = without(entry, EACH, COUNT, SPACING, *([SPARE] if has_spares else [])), (name, key)
                 usual = self.templates.applied(raw, path)
                 for one, change in made[key].items():
                     place = section.keys.get(one, section.keys[key])
@@ -337,8 +339,3 @@ def _maker(section: Fields, key: str) -> tuple[str, Place, Place]:
     assert isinstance(entry, Fields), "it makes others"
     by = next(one for one in (COUNT, EACH, SPARE) if one in entry.values)
     return by, entry.keys[by], entry.values[by].place
-
-
-def _has_spares(entry: Fields) -> bool:
-    """Whether `spare` is a count."""
-    return SPARE in entry.values and not isinstance(plain(entry.values[SPARE]), bool)

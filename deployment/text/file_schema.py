@@ -35,6 +35,15 @@ _OF_WHOLE: Final = ("required", "discriminator", "minProperties")
 _PARTIAL: Final = "Partial"
 _REF: Final = "#/$defs/"
 _NULL: Final[Schema] = {"type": "null"}
+_SPACINGS: Final[Schema] = {
+    "additionalProperties": False,
+    "description": DESCRIPTIONS[SPACING],
+    "properties": {axis: {"type": "string"} for axis in AXES},
+    "type": "object",
+}
+_SELECTOR: Final[Schema] = {"maxLength": SELECTOR_LENGTH_MAX, "pattern": SELECTOR_PATTERN, "type": "string"}
+_ROBOTS: Final[Schema] = {"items": _SELECTOR, "maxItems": limits.ENTITIES_MAX, "title": "Robots", "type": "array"}
+"""Of a node."""
 _SIGNS: Final[Schema] = {"pattern": "[$]", "type": "string"}
 
 
@@ -48,9 +57,11 @@ def file_schema(schema: Schema, presets: Mapping[str, Sequence[str]]) -> Schema:
     for section in ENTRIES:
         own: Schema = {LIKE: _text(LIKE)}
         if section in FLEETS:
-            own |= {COUNT: _count(FLEETS[section]), SPARE: _spare(FLEETS[section]), SPACING: _spacing()}
+            count = {"maximum": FLEETS[section], "minimum": 1, "type": "integer"}
+            spare = {"anyOf": [{"type": "boolean"}, count], "default": False, "description": DESCRIPTIONS[SPARE]}
+            own |= {COUNT: {"description": DESCRIPTIONS[COUNT], **count}, SPARE: spare, SPACING: _SPACINGS}
         else:
-            own |= {EACH: {**_text(EACH), "maxLength": SELECTOR_LENGTH_MAX, "pattern": SELECTOR_PATTERN}}
+            own |= {EACH: {**_text(EACH), **_SELECTOR}}
         ((pattern, entry),) = properties[section]["patternProperties"].items()
         partial = _Partial(models, has_signs=section in FOR_ROBOTS)
         partly: Schema = {"anyOf": [partial.of(one) for one in entry.get("oneOf", [entry])]}
@@ -62,7 +73,7 @@ def file_schema(schema: Schema, presets: Mapping[str, Sequence[str]]) -> Schema:
     for kit, names in presets.items():
         if kit in properties:
             properties[kit] = _with_presets(properties[kit], names, models)
-    models["NodeSpec"] = _with_keys(models["NodeSpec"], {"robots": _selectors()})
+    models["NodeSpec"] = _with_keys(models["NodeSpec"], {"robots": _ROBOTS})
     properties[TEMPLATES] = {
         "description": DESCRIPTIONS[TEMPLATES],
         "maxProperties": limits.TEMPLATES_MAX,
@@ -99,27 +110,6 @@ def _with_keys(model: Schema, keys: Schema) -> Schema:
 
 def _text(key: str) -> Schema:
     return {"description": DESCRIPTIONS[key], "type": "string"}
-
-
-def _count(entries_max: int) -> Schema:
-    return {"description": DESCRIPTIONS[COUNT], "maximum": entries_max, "minimum": 1, "type": "integer"}
-
-
-def _spare(entries_max: int) -> Schema:
-    count = {"maximum": entries_max, "minimum": 1, "type": "integer"}
-    return {"anyOf": [{"type": "boolean"}, count], "default": False, "description": DESCRIPTIONS[SPARE]}
-
-
-def _spacing() -> Schema:
-    lengths = {axis: {"type": "string"} for axis in AXES}
-    description = DESCRIPTIONS[SPACING]
-    return {"additionalProperties": False, "description": description, "properties": lengths, "type": "object"}
-
-
-def _selectors() -> Schema:
-    """Return the schema of a node's robots."""
-    item = {"maxLength": SELECTOR_LENGTH_MAX, "pattern": SELECTOR_PATTERN, "type": "string"}
-    return {"items": item, "maxItems": limits.ENTITIES_MAX, "title": "Robots", "type": "array"}
 
 
 class _Partial:

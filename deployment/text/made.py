@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
+from operator import is_not
 from typing import Final
 
 from foosim.common import units
@@ -208,21 +209,15 @@ def filled(node: Tree, values: Mapping[str, str]) -> Tree:
         return Leaf(node.place, put(str(node.value), node.place, values)) if has_signs else node
     if isinstance(node, Items):
         items = [filled(item, values) for item in node.items]
-        return Items(node.place, items) if any(map(_is_other, items, node.items)) else node
+        return Items(node.place, items) if any(map(is_not, items, node.items)) else node
     fields = Fields(node.place)
     for key, value in node.values.items():
         name, place = put(key, node.keys[key], values), node.keys[key]
         if name in fields.values:
             raise BadSign(place, BadValue(f"a key that is given twice for {values['robot']}", name))
         fields.values[name], fields.keys[name] = filled(value, values), place
-    is_same = [*fields.values] == [*node.values] and not any(
-        map(_is_other, fields.values.values(), node.values.values())
-    )
+    is_same = [*fields.values] == [*node.values] and not any(map(is_not, fields.values.values(), node.values.values()))
     return node if is_same else fields
-
-
-def _is_other(one: Tree, other: Tree) -> bool:
-    return one is not other
 
 
 def without_places_by_node(tree: Fields) -> None:

@@ -50,7 +50,7 @@ class Places:
             there = self._find(finding.other)
             if place.rank < there[0].rank and there[0].rank > SETS_RANK:  # it was set after the file
                 finding, (place, is_key, depth) = finding.other, there
-        written = (self._keys if is_key else self._values).get(place, ())
+        written = self._locations.get((place, is_key), ())
         if is_key and written[2:-1] == (SPACING,):
             axes = ", ".join(axis for axis in AXES if axis in finding.valid) or "none"
             finding = replace(finding, location=written, what=f"unknown key (there are: {axes})", nearest=None)
@@ -93,12 +93,9 @@ class Places:
         return plain(self._expanded)
 
     @cached_property
-    def _values(self) -> dict[Place, Location]:
-        return {place: location for place, is_key, location in _walk(self._written, ()) if not is_key}
-
-    @cached_property
-    def _keys(self) -> dict[Place, Location]:
-        return {place: location for place, is_key, location in _walk(self._written, ()) if is_key}
+    def _locations(self) -> dict[tuple[Place, bool], Location]:
+        """What is written at a place, by whether it is a key's."""
+        return {(place, is_key): location for place, is_key, location in _walk(self._written, ())}
 
 
 def _walk(node: Tree, location: Location) -> Iterator[tuple[Place, bool, Location]]:

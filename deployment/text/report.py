@@ -26,7 +26,6 @@ class Report:
     def __init__(self) -> None:
         self.problems: dict[Problem, None] = {}
         self.broken: set[tuple[str, str]] = set()
-        self.is_over = False
         self._sizes: dict[int, tuple[int, int]] = {}
         self._measured: list[Tree] = []
         self._nodes = 0
@@ -43,7 +42,6 @@ class Report:
 
     def stop(self) -> NoReturn:
         """Expand nothing more. Raises Stopped."""
-        self.is_over = True
         raise Stopped
 
     def count(self, tree: Tree, place: Place, path: Location) -> None:

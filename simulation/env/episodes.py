@@ -128,7 +128,10 @@ class Episodes:
         try:
             for name, agent in simulation.agents.items():
                 self.vectors[name] = _vectors(declared, agent, readings, commands, bounds or {}, ages)
-            robots = {name: _commanded(vectors[1]) for name, vectors in self.vectors.items()}
+            robots = {
+                name: tuple(dict.fromkeys(column.robot for column in commands.columns))
+                for name, (_, commands) in self.vectors.items()
+            }
             self._reward: Reward = reward(declared, robots)
         except BaseException:
             simulation.close()
@@ -290,7 +293,3 @@ def _vectors(
     if not command.columns:
         raise BadValue(f"agent {agent.name} has no command that is a vector of numbers", list(agent.robots))
     return read, command
-
-
-def _commanded(commands: CommandVector) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(column.robot for column in commands.columns))

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foosim.console.clock.comparing import POINTS, Comparison, Course
 from foosim.console.recorded.recording import Recording
-from foosim.console.recorded.whereabouts import Whereabouts
-from foosim.console.shown.compare import POINTS, Comparison, Course, Distance
 from foosim.console.shown.tracks import Track
 
 MS = 1_000_000
@@ -60,27 +59,25 @@ def test_a_series_has_holes_where_one_side_is_not_known_and_grows_with_the_span(
 
 
 def test_a_capture_is_nowhere_from_itself_and_interpolated_between_its_frames(run: Path) -> None:
-    one, other = (Whereabouts(Recording(run)) for _ in range(2))
+    one, other = (Recording(run).poses_at for _ in range(2))
     for tick in (0, 10, 15, 123, 300):
         poses = one(tick * 2 * MS)
         assert poses == other(tick * 2 * MS) and "ball" in poses and "red.goal" in poses
     ball = [one(tick * 2 * MS)["ball"][0] for tick in (100, 105, 110)]
     assert ball[1] == pytest.approx([(a + b) / 2 for a, b in zip(ball[0], ball[2], strict=True)])
     assert one(301 * 2 * MS) == {} and one(-1) == {}
-    shifted = Whereabouts(Recording(run), 20 * MS)
-    assert shifted(0) == one(20 * MS), "an offset is the capture's time at the deck's time 0"
-    assert "red.goal/slide" in Whereabouts(Recording(run), links=True)(0) and "red.goal/slide" not in one(0)
+    assert "red.goal/slide" in one(0, links=True) and "red.goal/slide" not in one(0)
 
 
 def test_a_course_has_the_newest_point_a_hole_where_nobody_looked_and_forgets_what_was_later() -> None:
     course = Course()
     for tick in (10, 20):
-        told = course.take(tick, [Distance("ball", tick / 10), Distance("rod", 0.5)])
+        told = course.take(tick, [("ball", tick / 10), ("rod", 0.5)])
     assert told["entities"] == [{"name": "ball", "distance_m": 2.0}, {"name": "rod", "distance_m": 0.5}]
     assert (told["at"], told["series"]) == (20, [[10, 1.0], [20, 2.0]])
     course.interrupt()
-    assert course.take(50, [Distance("ball", 5.0)])["series"] == [[10, 1.0], [20, 2.0], [21, None], [50, 5.0]]
-    assert course.take(20, [Distance("ball", 7.0)])["series"] == [[10, 1.0], [20, 7.0]], "time went back"
+    assert course.take(50, [("ball", 5.0)])["series"] == [[10, 1.0], [20, 2.0], [21, None], [50, 5.0]]
+    assert course.take(20, [("ball", 7.0)])["series"] == [[10, 1.0], [20, 7.0]], "time went back"
     for tick in (30, 40, 50, 60, 70):
         told = course.take(tick, [])
     known = [at for at, metres in told["series"] if metres is None]

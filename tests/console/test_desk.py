@@ -11,7 +11,7 @@ from foosim.capture.reader import open_capture
 from foosim.capture.rows import PACKETS, PacketRow
 from foosim.client.client import Client
 from foosim.common.units import Pace
-from foosim.console.live.desk import Desk
+from foosim.console.live.sending import Desk
 from foosim.deployment.loader import load_deployment
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings

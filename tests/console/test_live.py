@@ -12,8 +12,7 @@ import pytest
 from foosim.client.control import Control
 from foosim.common.errors import BadValue
 from foosim.console.live import live_source
-from foosim.console.live.live_source import LiveSource
-from foosim.console.live.presence import how_ended
+from foosim.console.live.live_source import LiveSource, how_ended
 from foosim.console.shown.source import Curve, Wanted
 from foosim.launcher.outcome import result_without_supervisor
 from foosim.launcher.run_options import RunOptions, launch_of

@@ -25,7 +25,7 @@ from foosim.library.table.ball import BallSettings
 from foosim.library.table.camera import CameraRobot
 from foosim.library.table.encoder import EncoderSettings
 from foosim.library.table.rod import RodRobot
-from foosim.library.table.settings import LINE_NAMES, TEAMS, table_of
+from foosim.library.table.settings import table_of
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.world.forms.per_field import numbers_of, read_per_field
 from foosim.world.forms.registry import find, find_component, find_engine, find_model
@@ -55,29 +55,6 @@ def data_of(text: str) -> Any:
     assert tree is not None
     assert problems == []
     return plain(tree)
-
-
-def test_the_table_has_eight_rods_a_camera_two_nodes_and_two_players(table: Deployment) -> None:
-    rods = [f"{team}.{line}" for team in TEAMS for line in LINE_NAMES]
-    assert sorted(table.robots) == sorted([*rods, "camera"])
-    for name in rods:
-        robot = table.robots[name]
-        assert isinstance(robot, RodRobot)
-        assert name == f"{robot.team}.{robot.line}"
-    owners = table.owners()
-    assert list(owners) == sorted(owners)
-    assert owners == {name: name.split(".")[0] for name in rods} | {"camera": "red"}
-    assert table.endpoints() == sorted([*rods, "camera", "player-red", "player-blue"])
-    for team in TEAMS:
-        player = table.players[f"player-{team}"]
-        assert (player.class_, player.rate_hz, player.lockstep) == (
-            "foosim.library.table.players.football:Team",
-            Fraction(50),
-            True,
-        )
-        assert (player.act, player.arrivals) == ("arrival", {"camera": ["ball"]})
-        assert player.robots == {f"{team}.{line}": ["encoder"] for line in LINE_NAMES} | {"camera": ["ball"]}
-        assert player.parameters == {"team": team}
 
 
 def test_quantities_are_si_numbers_and_times_are_nanoseconds(table: Deployment) -> None:

@@ -174,20 +174,6 @@ def test_each_problem_is_one_line_with_its_place(case: Case) -> None:
         assert load_deployment(short, "short").model_dump() == load_deployment(long, "long").model_dump()
 
 
-def test_all_problems_of_fields_come_at_once_in_the_files_order_then_all_between_them() -> None:
-    between = (5, "substeps: 3"), (29, "    robots: [red.gaol, camera]")
-    assert problems_of(changed((3, "seed: x"), (6, "engine: bulet"), (46, "      los: 0.5 %"), *between)) == [
-        "small.yaml:3:7: seed: not a whole number, 'x'",
-        "small.yaml:6:9: engine: unknown engine (there are: bullet, mujoco, pure), 'bulet', nearest is 'bullet'",
-        "small.yaml:46:7: network.links[0]: unknown key, 'los', nearest is 'loss'",
-    ]
-    assert problems_of(changed(*between)) == [
-        "small.yaml:5:11: substeps: does not divide the tick of 2000000 ns, 3, nearest is 2 and 4",
-        "small.yaml:10:3: robots: a robot that no node owns, 'red.goal'",
-        "small.yaml:29:14: nodes.one.robots[0]: unknown robot, 'red.gaol', nearest is 'red.goal'",
-    ]
-
-
 @pytest.mark.parametrize("text", ["null", "[]", "text", "1", "''"])
 def test_a_file_that_is_no_mapping_is_refused(text: str) -> None:
     assert len(problems_of(text)) == 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import floor, pi, sqrt
 from pathlib import Path
 from typing import Final
 
@@ -63,8 +63,14 @@ def moved(frame: Frame, entity: str, field: str, *values: float) -> Frame:
     return Frame(frame.tick, frame.layout, None, numbers=numbers)
 
 
+def pixel(painter: OverheadPainter, x: float, y: float) -> tuple[int, int]:
+    """Return column and row of the pixel that shows a place (m)."""
+    view = painter.view
+    return floor((x - view.left) * view.scale), floor((view.top - y) * view.scale)
+
+
 def colour_at(painter: OverheadPainter, picture: Picture, x: float, y: float) -> tuple[int, ...]:
-    column, row = painter.pixel(x, y)
+    column, row = pixel(painter, x, y)
     return tuple(picture[row, column].tolist())
 
 
@@ -200,8 +206,8 @@ def test_a_figure_swings_out_to_the_side() -> None:
     painter, frame = painter_of("table.yaml", (960, 540))
     swung = painter.paint(moved(frame, "red.goal", "joint_positions", 0.05, pi / 2))
     red = (204, 26, 26)
-    columns = np.flatnonzero((swung == red).all(axis=2)[painter.pixel(0.0, 0.05)[1]])
-    left, right = painter.pixel(-0.522 - 0.072, 0.0)[0], painter.pixel(-0.522 + 0.072, 0.0)[0]
+    columns = np.flatnonzero((swung == red).all(axis=2)[pixel(painter, 0.0, 0.05)[1]])
+    left, right = pixel(painter, -0.522 - 0.072, 0.0)[0], pixel(painter, -0.522 + 0.072, 0.0)[0]
     assert columns.min() in range(left, left + 3) or columns.max() in range(right - 3, right + 2)
 
 
@@ -220,7 +226,7 @@ def test_a_region_is_shown_whole() -> None:
     frame = initial_frame(deployment)
     scene = build_scene(deployment, frame.layout)
     painter = OverheadPainter(scene, frame.layout, (100, 50), (-0.1, -0.1, 0.1, 0.1))
-    assert painter.pixel(-0.1, 0.1) == (25, 0) and painter.pixel(0.0999, -0.0999) == (74, 49)
+    assert pixel(painter, -0.1, 0.1) == (25, 0) and pixel(painter, 0.0999, -0.0999) == (74, 49)
 
 
 @pytest.mark.parametrize(

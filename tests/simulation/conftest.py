@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
@@ -20,6 +21,7 @@ from foosim.capture.contents import declare_topics, write_all
 from foosim.capture.mcap.checks import CHECKS
 from foosim.capture.mcap.format import McapFile, Message
 from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.parts import files_from
 from foosim.capture.reader import open_capture
 from foosim.capture.rows import FRAME, PROFILE, Fate, PacketRow
 from foosim.cli.verbs import app
@@ -77,6 +79,19 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def again(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same run once more, in a large chunk."""
     return capture_to(tmp_path_factory.mktemp("replay") / "again.mcap")
+
+
+def captured_in_files(path: Path, *sets: str) -> Path:
+    sets = (*SETS, "capture.split_time=100 ms", *sets)
+    rehearsed = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, sets, prepare=disturb, capture=path)
+    assert rehearsed.json["capture"] == str(files_from(path)[0]), "a file that is there"
+    return path
+
+
+@pytest.fixture(scope="session")
+def split_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run of `run`, in six files and one for its last frame."""
+    return captured_in_files(tmp_path_factory.mktemp("split") / "run.mcap")
 
 
 def disrupt(system: System) -> None:
@@ -171,8 +186,11 @@ def replay(*arguments: str | Path) -> Done:
 
 
 def foosim(*words: str | Path) -> Done:
-    """Run `foosim` as a person would: what is refused is told on standard error."""
+    """Run `foosim` as a person would: what is refused is told on standard error. The process keeps its signals."""
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     done = CliRunner().invoke(app, [str(word) for word in words])
+    for number, handler in kept.items():
+        signal.signal(number, handler)
     if isinstance(done.exception, Refused):
         return Done(done.exception.exit_code, done.stdout, f"{done.stderr}{done.exception}\n")
     if done.exception is not None and not isinstance(done.exception, SystemExit):

@@ -11,10 +11,15 @@ import msgspec
 import pytest
 
 from foosim.capture.info import capture_info
+from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.reader import open_capture
 from foosim.capture.start_frame import BadBranch, read_branch
 from foosim.common.units import parse_ns
+from foosim.console.recorded.recording import Recording
+from foosim.console.report.collect import gather
+from foosim.console.report.page import page
 from foosim.deployment.loader import load_deployment
+from foosim.simulation.play.main import read_span
 from tests.simulation.conftest import TABLE, damaged, messages_of, replay
 
 
@@ -32,21 +37,46 @@ def test_info_counts_what_the_capture_has(run: Path) -> None:
     assert content["causes"] == dict(info.causes) and content["channels"] == dict(info.channels)
 
 
-def test_info_of_an_unfinished_one_says_so(run: Path, tmp_path: Path) -> None:
-    left = tmp_path / "left.mcap"
-    left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
-    shown = replay("info", left)
-    assert shown.code == 0 and "not finished, " in shown.out
-
-
-def test_what_is_no_capture_is_refused_before_anything_is_simulated(bad_files: list[Path]) -> None:
+def test_no_command_takes_what_is_no_capture_and_none_leaves_a_file(
+    run: Path, tmp_path: Path, bad_files: list[Path]
+) -> None:
     deployment = load_deployment(TABLE.read_text(), TABLE.name)
+    torn = damaged(run, tmp_path / "damaged.mcap")
+    before = sorted(tmp_path.iterdir())
+
+    def refused(bad: Path, *words: str | Path) -> None:
+        done = replay(*words)
+        assert done.code == 2 and done.out == "" and done.err.startswith(f"{bad}: "), (words, done)
+        assert done.err.count("\n") == 1 and sorted(tmp_path.iterdir()) == before, words
+
     for bad in bad_files:
-        for command in ("info", "verify", "what-if"):
-            done = replay(command, bad)
-            assert done.code == 2 and done.err.startswith(f"{bad}: ") and done.err.count("\n") == 1, command
+        for command in ("info", "verify", "what-if", "play"):
+            refused(bad, command, bad)
+        refused(bad, "diff", run, bad)
+        refused(bad, "diff", bad, run)
         with pytest.raises(BadBranch, match=f"--from: {bad}: "):
             read_branch(f"{bad}@0.1s", deployment)
+        with pytest.raises(CaptureError, match=str(bad)):
+            Recording(bad)
+    for bad in (*bad_files, torn):
+        for command, out in (("cut", "o.mcap"), ("export", "o.csv"), ("report", "o.html")):
+            refused(bad, command, bad, "-o", tmp_path / out)
+
+
+def test_commands_take_what_a_killed_writer_left_up_to_its_last_chunk(run: Path, tmp_path: Path) -> None:
+    left = tmp_path / "left.mcap"
+    left.write_bytes(run.read_bytes()[: run.stat().st_size * 2 // 3])
+    last = int(open_capture(left).ticks[-1])
+    span, about = read_span(left)
+    assert 100 < last < 300 and not about.finished and span.last_ns == last * 2_000_000
+    shown = replay("info", left)
+    assert shown.code == 0 and "not finished, " in shown.out
+    assert replay("export", left, "--what", "tick", "-o", "-").out.count("\n") == last + 2
+    assert replay("cut", left, "--from", "40 ms", "-o", tmp_path / "o.mcap").code == 0
+    assert open_capture(tmp_path / "o.mcap").ticks.tolist() == list(range(20, last + 1))
+    part = gather(open_capture(left), "left")
+    assert part["end_ns"] == span.last_ns and part["fates"]["offered"] > 0 == part["fates"]["in_flight"]
+    assert "not finished" in page(part)
 
 
 def test_a_finished_capture_is_clean(run: Path) -> None:

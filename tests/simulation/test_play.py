@@ -179,17 +179,6 @@ def test_streams_are_chosen_by_who_listens(run: Path) -> None:
             hear_replay(play.address, ("pose",))
 
 
-def test_what_a_killed_writer_left_plays_up_to_its_last_chunk(run: Path, tmp_path: Path) -> None:
-    left = tmp_path / "left.mcap"
-    left.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
-    last = int(open_capture(left).ticks[-1])
-    with playing(left, pace=FAST, paused=True, topics=("/tick",)) as play, hear_replay(play.address) as heard:
-        heard.resume()
-        rows = [item for item in heard if isinstance(item, PlayedRow)]
-        assert [msgspec.json.decode(row.row)["tick"] for row in rows] == list(range(last + 1))
-    assert "not finished" in play.stage.text.getvalue() and play.result().reason == "end"
-
-
 def test_a_damaged_one_plays_up_to_there_and_fails(run: Path, tmp_path: Path) -> None:
     damaged(run, tmp_path / "damaged.mcap")
     with playing(tmp_path / "damaged.mcap", pace=FAST, loop=True) as play:
@@ -197,17 +186,14 @@ def test_a_damaged_one_plays_up_to_there_and_fails(run: Path, tmp_path: Path) ->
         assert result.failed and "damaged.mcap: byte " in result.reason and result.published > 100
 
 
-def test_a_loop_goes_round_and_the_clock_tells(run: Path) -> None:
+def test_a_loop_plays_its_part_again_until_it_is_stopped(run: Path) -> None:
     part: dict[str, Any] = {"from_ns": 100 * MS, "until_ns": 120 * MS, "loop": True, "topics": ("/tf",)}
     with playing(run, pace=FAST, paused=True, **part) as play, hear_replay(play.address) as heard:
         heard.resume()
         times: list[int] = []
         while len(times) < 9:
             times += [item.time_ns for item in heard.take(LIMIT_S) if isinstance(item, PlayedPoses)]
-        assert times[:6] == [100 * MS, 120 * MS] * 3
-        assert heard.clock is not None and heard.clock.jumps > 0
-        play.stopper.stop()
-        assert play.result().rounds > 2
+        assert times[:6] == [100 * MS, 120 * MS] * 3 and heard.clock is not None and heard.clock.jumps > 0
 
 
 def test_the_command_controls_the_newest_replay(run: Path) -> None:
@@ -256,25 +242,8 @@ def test_bad_control_is_named(arguments: tuple[str, ...], text: str) -> None:
     ],
 )
 def test_bad_options_of_play_are_named(run: Path, arguments: tuple[str, ...], code: int, text: str) -> None:
-    with kept_signals():
-        done = replay("play", run, *arguments)
+    done = replay("play", run, *arguments)
     assert done.code == code and text in done.err and done.out == ""
-
-
-@contextmanager
-def kept_signals() -> Iterator[None]:
-    """The command takes the signals of its process over."""
-    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    yield
-    for number, handler in kept.items():
-        signal.signal(number, handler)
-
-
-def test_bad_files_are_named(bad_files: list[Path]) -> None:
-    for bad in bad_files:
-        with kept_signals():
-            done = replay("play", bad)
-        assert done.code == 2 and str(bad) in done.err
 
 
 def test_nobody_at_an_address_is_told(tmp_path: Path) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, Final
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from foosim.capture.mcap.checks import CaptureError
 from foosim.common.errors import BadValue
@@ -76,13 +78,61 @@ class Theatre:
             self.turn()
 
 
-def test_everything_is_published_when_it_is_due_and_not_before() -> None:
-    theatre = Theatre([0, 1, 1, 2.5, 40, 41])
-    theatre.play()
-    assert theatre.heard == [(int(t * MS), int(t * MS)) for t in (0, 1, 1, 2.5, 40, 41)]
-    found = theatre.playback
-    assert (found.published, found.late_ns_max, found.slips, found.rounds) == (6, 0, 0, 1)
-    assert theatre.playback.ended and theatre.playback.failure == ""
+LAST_MS: Final = 60
+CHANGES: Final = st.one_of(
+    st.tuples(st.sampled_from(["pause", "resume"]), st.just(0)),
+    st.tuples(st.just("step"), st.integers(1, 6)),
+    st.tuples(st.just("seek"), st.integers(0, LAST_MS)),
+    st.tuples(st.just("pace"), st.sampled_from([1, 2, 4])),
+)
+
+
+@given(
+    st.lists(st.integers(0, 2 * LAST_MS), min_size=1, max_size=30),
+    st.lists(st.tuples(st.integers(0, 30), CHANGES), max_size=8),
+    st.booleans(),
+)
+def test_requests_leave_nothing_out_and_repeat_nothing(
+    halves: list[int], changes: list[tuple[int, tuple[str, int]]], paused: bool
+) -> None:
+    """Compared with pieces of time: each has the entries of its captured times, each at its time; silence is played."""
+    times = sorted(half / 2 for half in halves)
+    theatre = Theatre(times, span_ms=(0, LAST_MS), paused=paused)
+    playback, heard = theatre.playback, list[tuple[float, float]]()
+    wall, at, pace, place = 0.0, 0.0, 1, 0
+    for passed, (verb, number) in [*changes, (1000, ("end", 0))]:
+        theatre.play(wall + passed)
+        until = at if paused else min(LAST_MS, at + passed * pace)
+        while not paused and place < len(times) and times[place] <= until:
+            heard.append((wall + (times[place] - at) / pace, times[place]))
+            place += 1
+        is_over = until == LAST_MS and not paused
+        assert playback.ended == is_over
+        if is_over:
+            break
+        wall, at = wall + passed, until
+        now_ns = theatre.now_ns
+        assert playback.time_ns(now_ns) == int(at * MS) and playback.state() == ("paused" if paused else "playing")
+        if verb in ("pause", "resume"):
+            getattr(playback, verb)(now_ns)
+            paused = verb == "pause"
+        elif verb == "pace":
+            playback.set_pace(parse_pace(f"{number}x"), now_ns)
+            pace = number
+        elif verb == "seek":
+            playback.seek(number * MS, now_ns)
+            at, place = number, sum(time < number for time in times)
+        elif verb == "step":
+            playback.step(number, now_ns)
+            paused, at = True, min(LAST_MS, (at // 2 + number) * 2)
+            while place < len(times) and times[place] <= at:
+                heard.append((wall, times[place]))
+                place += 1
+            theatre.turn()
+            if at == LAST_MS:
+                break
+    assert theatre.heard == [(int(wall * MS), int(time * MS)) for wall, time in heard]
+    assert (playback.published, playback.late_ns_max, playback.slips, playback.failure) == (len(heard), 0, 0, "")
 
 
 @pytest.mark.parametrize("pace", ["2x", "0.5x", "3x", "1/3x"])
@@ -122,84 +172,18 @@ def test_a_long_lag_moves_the_anchor_and_is_counted() -> None:
     assert walls == [0, 10, 1200, 1210, 2200] and theatre.playback.slips == 1
 
 
-def test_it_begins_and_ends_at_the_ends_of_its_span() -> None:
-    theatre = Theatre([0, 1, 7, 100], span_ms=(5, 50))
-    theatre.play()
-    assert theatre.heard == [(2 * MS, 7 * MS)], "2 ms after the beginning of the span"
-    assert theatre.now_ns - START_NS == 45 * MS, "silence is played, too"
-
-
-def test_pause_and_resume_leave_nothing_out_and_repeat_nothing() -> None:
-    theatre = Theatre([float(t) for t in range(100)])
-    theatre.play(20.5)
-    theatre.playback.pause(theatre.now_ns)
-    assert theatre.turn() is None and theatre.playback.state() == "paused"
-    theatre.now_ns += 1000 * MS
-    assert theatre.turn() is None and theatre.playback.time_ns(theatre.now_ns) == 20.5 * MS
-    theatre.playback.resume(theatre.now_ns)
-    theatre.play()
-    assert theatre.heard_ms == list(range(100))
-    assert theatre.heard[21][0] == 1021 * MS
-
-
-def test_starting_paused_publishes_nothing_until_resumed() -> None:
-    theatre = Theatre([0, 1], paused=True)
-    theatre.play(100)
-    assert theatre.heard == []
-    theatre.playback.resume(theatre.now_ns)
-    theatre.play()
-    assert [wall_ns // MS for wall_ns, _ in theatre.heard] == [100, 101]
-
-
-def test_steps_publish_ticks_at_once_and_stand() -> None:
+def test_steps_that_are_requested_before_the_first_is_done_add_up() -> None:
     theatre = Theatre([t / 2 for t in range(41)], paused=True)
-    theatre.playback.step(1, theatre.now_ns)
-    assert theatre.playback.heading_ns(theatre.now_ns) == TICK_NS
-    theatre.turn()
-    assert theatre.heard_ms == [0, 0.5, 1, 1.5, 2] and theatre.playback.state() == "paused"
-    assert theatre.playback.time_ns(theatre.now_ns) == TICK_NS
     theatre.playback.step(2, theatre.now_ns)
-    theatre.playback.step(1, theatre.now_ns)  # asked before the first was done: they add up
+    theatre.playback.step(1, theatre.now_ns)
+    assert theatre.playback.heading_ns(theatre.now_ns) == 3 * TICK_NS
     theatre.turn()
-    assert theatre.heard_ms[-1] == 8
-    theatre.playback.step(100, theatre.now_ns)
-    theatre.turn()
-    assert theatre.heard_ms == [t / 2 for t in range(41)] and theatre.playback.ended
+    assert theatre.heard_ms[-1] == 6
     for wrong in (0, -1, STEPS_MAX + 1):
         with pytest.raises(BadValue, match="not a number of ticks"):
-            Theatre([0]).playback.step(wrong, 0)
-
-
-def test_a_step_while_it_plays_pauses_it() -> None:
-    theatre = Theatre([float(t) for t in range(100)])
-    theatre.play(10.5)
-    theatre.playback.step(1, theatre.now_ns)
-    theatre.play(50)
-    assert theatre.heard_ms[-1] == 12 and theatre.playback.state() == "paused"
-
-
-def test_seek_forth_and_back_reads_anew() -> None:
-    theatre = Theatre([float(t) for t in range(100)])
-    theatre.play(10)
-    theatre.playback.seek(50 * MS, theatre.now_ns)
-    theatre.play(20)
-    theatre.playback.pause(theatre.now_ns)
-    theatre.playback.seek(5 * MS, theatre.now_ns)
-    theatre.turn()
-    assert theatre.heard_ms == [*range(11), *range(50, 61)], "paused it stays"
-    theatre.playback.resume(theatre.now_ns)
-    theatre.play(22.5)
-    assert theatre.heard_ms[-3:] == [5, 6, 7] and theatre.playback.clock(theatre.now_ns).jumps == 2
-    with pytest.raises(BadValue, match="not a time that is played, 0 s to 99 ms, '100 ms'"):
-        theatre.playback.seek(100 * MS, theatre.now_ns)
-
-
-def test_a_change_of_rate_goes_on_from_here() -> None:
-    theatre = Theatre([float(t) for t in range(100)])
-    theatre.play(10)
-    theatre.playback.set_pace(parse_pace("10x"), theatre.now_ns)
-    theatre.play(15)
-    assert theatre.heard_ms == list(range(61)) and theatre.playback.clock(theatre.now_ns).rate == "10x"
+            theatre.playback.step(wrong, 0)
+    with pytest.raises(BadValue, match="not a time that is played, 0 s to 20 ms, '21 ms'"):
+        theatre.playback.seek(21 * MS, theatre.now_ns)
 
 
 def test_a_loop_plays_its_part_again_until_it_is_stopped() -> None:

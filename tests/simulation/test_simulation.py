@@ -9,7 +9,6 @@ from typing import Final
 
 import pytest
 
-from foosim.capture.start_frame import read_branch
 from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
@@ -24,7 +23,7 @@ from foosim.simulation.simulation import Simulation, read_for_stepping
 from foosim.simulation.stepped_world import SteppedWorld
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.robot_packets import Delivered
-from tests.waving import PERFECT, PERIOD, PLAYERS, waved
+from tests.waving import PERIOD, PLAYERS, waved
 
 DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 TABLE: Final = DEPLOY / "table.yaml"
@@ -101,36 +100,6 @@ def test_without_a_network_commands_arrive_at_the_frame_at_which_they_are_sent()
                 assert simulation.frame.digest == world.step(delivered).digest, tick
     finally:
         world.close()
-
-
-def test_from_a_captured_frame_it_goes_on_as_the_captured_run(tmp_path: Path) -> None:
-    """A perfect network brings commands a tick after they were sent, so steps begin one tick after the player's."""
-    capture, begin = tmp_path / "run.mcap", 4 * PERIOD + 1
-    sets = [PLAYERS, WAIT, PERFECT, "capture.frames_every=1 ticks"]
-    run = run_of(TABLE, TICKS, *sets, capture=capture)
-    at = f"{capture}@{begin * 2} ms"
-    with Simulation(TABLE, sets=sets, seed=9) as simulation:
-        simulation.reset(at)
-        assert simulation.tick == begin and simulation.frame.digest == run.digests[begin - 1]
-        while simulation.tick + PERIOD <= TICKS:
-            simulation.step(waved(simulation.tick), PERIOD)
-            assert simulation.frame.digest == run.digests[simulation.tick - 1], simulation.tick
-        assert simulation.tick > begin + 6 * PERIOD
-        start = read_branch(at, simulation.deployment).start
-        assert simulation.reset(start).digest == run.digests[begin - 1]
-
-
-def test_equal_seeds_give_equal_worlds_and_others_do_not() -> None:
-    deployment = read_for_stepping(TABLE, [PLAYERS, WAIT])
-    with Simulation(deployment) as simulation:
-
-        def run(seed: int | None) -> list[bytes]:
-            simulation.reset(seed=seed)
-            return digests_of(simulation, 30)
-
-        first, other, declared = run(7), run(8), run(None)
-        assert run(7) == first and len({first[-1], other[-1], declared[-1]}) == 3
-        assert run(deployment.seed) == declared
 
 
 def test_what_a_person_sees() -> None:

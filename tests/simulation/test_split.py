@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgspec
-import pytest
 
 from foosim.capture.diff import diff_captures
 from foosim.capture.parts import files_from
@@ -14,61 +13,47 @@ from foosim.capture.start_frame import read_branch
 from foosim.console.report.collect import gather
 from foosim.deployment.loader import load_deployment
 from foosim.simulation.play.main import read_span
-from foosim.simulation.run import rehearse
 from foosim.simulation.what_if import what_if
-from tests.simulation.conftest import SETS, TABLE, TICKS, disturb, replay
+from tests.simulation.conftest import captured_in_files, replay
 
 
-def captured(path: Path, *sets: str) -> Path:
-    sets = (*SETS, "capture.split_time=100 ms", *sets)
-    rehearsed = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, sets, prepare=disturb, capture=path)
-    assert rehearsed.json["capture"] == str(files_from(path)[0]), "a file that is there"
-    return path
-
-
-@pytest.fixture(scope="module")
-def split(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run of `run`, in six files and one for its last frame."""
-    return captured(tmp_path_factory.mktemp("split") / "run.mcap")
-
-
-def test_it_is_the_run_in_one_file(run: Path, split: Path) -> None:
-    assert len(files_from(split)) == 7
-    found = diff_captures(run, split)
+def test_it_is_the_run_in_one_file(run: Path, split_run: Path) -> None:
+    assert len(files_from(split_run)) == 7
+    found = diff_captures(run, split_run)
     assert found.equal and found.about == ("metadata part", "the deployment")
     assert all(channel.rows[0] == channel.rows[1] for channel in found.channels.values())
 
 
-def test_commands_read_on(run: Path, split: Path, tmp_path: Path) -> None:
-    info, whole = (msgspec.json.decode(replay("info", path, "--json").out) for path in (split, run))
+def test_commands_read_on(run: Path, split_run: Path, tmp_path: Path) -> None:
+    info, whole = (msgspec.json.decode(replay("info", path, "--json").out) for path in (split_run, run))
     assert len(info["parts"]) == 7 and info["parts"][1] == "run_0001.mcap"
     for key in ("chain", "digest", "ticks", "packets", "causes", "topics", "finished", "clients", "end"):
         assert info[key] == whole[key], key
-    assert "  7 files: run.mcap to run_0006.mcap\n" in replay("info", split).out
-    assert replay("verify", split).out == replay("verify", run).out
-    assert read_span(split)[0] == read_span(run)[0]
+    assert "  7 files: run.mcap to run_0006.mcap\n" in replay("info", split_run).out
+    assert replay("verify", split_run).out == replay("verify", run).out
+    assert read_span(split_run)[0] == read_span(run)[0]
     outs = []
-    for path in (split, run):
+    for path in (split_run, run):
         outs.append(tmp_path / f"{path.parent.name}.csv")
         assert replay("export", path, "--what", "poses", "-o", outs[-1]).code == 0
     assert outs[0].read_bytes() == outs[1].read_bytes()
-    assert what_if(open_capture(split)).changed == 0
-    reports = [gather(open_capture(path), "run") for path in (split, run)]
+    assert what_if(open_capture(split_run)).changed == 0
+    reports = [gather(open_capture(path), "run") for path in (split_run, run)]
     assert reports[0] | {"metadata": {}} == reports[1] | {"metadata": {}}
 
 
-def test_a_run_begins_with_a_frame_of_any_file(run: Path, split: Path) -> None:
+def test_a_run_begins_with_a_frame_of_any_file(run: Path, split_run: Path) -> None:
     deployment = load_deployment(open_capture(run).about.deployment_text, "table.yaml")
     for at in ("60 ms", "0.4 s", "0.6 s"):
-        mine, theirs = (read_branch(f"{path}@{at}", deployment).start for path in (split, run))
+        mine, theirs = (read_branch(f"{path}@{at}", deployment).start for path in (split_run, run))
         assert (mine.origin, mine.values) == (theirs.origin, theirs.values)
-    third = split.with_name("run_0003.mcap")
+    third = split_run.with_name("run_0003.mcap")
     mine, theirs = (read_branch(f"{path}@0.4 s", deployment).start for path in (third, run))
     assert (mine.origin.chain, mine.values) == (theirs.origin.chain, theirs.values)
 
 
-def test_a_file_that_is_missing_is_bad_input(tmp_path: Path, split: Path) -> None:
-    for file in files_from(split):
+def test_a_file_that_is_missing_is_bad_input(tmp_path: Path, split_run: Path) -> None:
+    for file in files_from(split_run):
         if not file.name.endswith("3.mcap"):
             (tmp_path / file.name).write_bytes(file.read_bytes())
     for command in ("info", "verify", "what-if", "play", "recover"):
@@ -80,11 +65,11 @@ def test_a_file_that_is_missing_is_bad_input(tmp_path: Path, split: Path) -> Non
     assert "continues in run_0003.mcap, which is missing" in replay("info", tmp_path / "run.mcap").out
 
 
-def test_the_last_seconds_are_played_cut_and_told(split: Path, run: Path, tmp_path: Path) -> None:
-    path = captured(tmp_path / "run.mcap", "capture.last=150 ms")
+def test_the_last_seconds_are_played_cut_and_told(split_run: Path, run: Path, tmp_path: Path) -> None:
+    path = captured_in_files(tmp_path / "run.mcap", "capture.last=150 ms")
     assert [file.name for file in files_from(path)] == ["run_0004.mcap", "run_0005.mcap", "run_0006.mcap"]
     span, about = read_span(path)
-    assert span == read_span(split.with_name("run_0004.mcap"))[0] and about.metadata["cut_tick"] == "200"
+    assert span == read_span(split_run.with_name("run_0004.mcap"))[0] and about.metadata["cut_tick"] == "200"
     assert "  last: 150 ms\n" in replay("info", path).out
     for source, out in ((path, "a.mcap"), (run, "b.mcap")):
         assert replay("cut", source, "--from", "0.45 s", "--to", "0.55 s", "-o", tmp_path / out).code == 0

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from contextlib import closing, redirect_stdout
+from contextlib import redirect_stdout
 from dataclasses import asdict, replace
 from io import StringIO
-from multiprocessing import active_children
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
-from foosim.common.errors import Failed
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.node.core import NodeCore
@@ -23,7 +21,7 @@ from foosim.runtime.roles.bus import CALM
 from foosim.simulation.settings import Clock
 from foosim.simulation.system import Settings
 from foosim.vhub.state.records import TickRecord
-from tests.swarm.__main__ import fly_seeds, main
+from tests.swarm.__main__ import main
 from tests.swarm.campaign import FAULTS, NODES, WORLDS, Flight, Plan, fly, plan_of, undisturbed
 from tests.swarm.faults import (
     CHANGES_THE_WORLD,
@@ -61,20 +59,6 @@ def test_the_laws_hold_under_random_faults_and_a_seed_flies_equally_each_time(to
     assert {flown["ticks"] for flown in told["seeds"]} == {TICKS}
     lost = next(flown for flown in told["seeds"] if flown["losses"])
     assert asdict(fly(TABLE.read_text(), TABLE.name, lost["seed"])) == lost
-
-
-def test_processes_fly_seeds_as_one_does_and_a_killed_one_is_named(told: dict[str, Any]) -> None:
-    """Each ends with the iterator, also amid a seed."""
-    text, seeds = TABLE.read_text(), range(FIRST, FIRST + 6)
-    with closing(fly_seeds(text, TABLE.name, seeds, TICKS, jobs=2)) as flights:
-        assert [asdict(next(flights)) for _ in seeds[:2]] == told["seeds"][:2]
-    assert active_children() == []
-    flights = fly_seeds(text, TABLE.name, range(FIRST, FIRST + 100), TICKS, jobs=2)
-    next(flights)
-    active_children()[0].kill()
-    with pytest.raises(Failed, match="a process of the swarm was killed; fewer than --jobs 2 need less memory"):
-        list(flights)
-    assert active_children() == []
 
 
 def test_the_laws_hold_in_a_world_that_lives() -> None:

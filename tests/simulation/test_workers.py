@@ -9,6 +9,7 @@ from time import sleep
 
 import pytest
 
+from foosim.common.errors import Failed
 from foosim.simulation.workers import in_processes
 
 
@@ -31,4 +32,14 @@ def test_what_work_raises_comes_out_and_nobody_is_left(jobs: int) -> None:
     before = {*active_children()}
     with pytest.raises(ValueError, match="math domain error"):
         list(in_processes(sqrt, [1.0, -1.0, 4.0], jobs, "the test"))
+    assert {*active_children()} == before
+
+
+def test_a_worker_that_was_killed_is_named_and_nobody_is_left() -> None:
+    before = {*active_children()}
+    results = in_processes(sleep, [0.0, *[600.0] * 8], 2, "the test")
+    next(results)
+    ({*active_children()} - before).pop().kill()
+    with pytest.raises(Failed, match="a process of the test was killed; fewer than --jobs 2 need less memory"):
+        next(results)
     assert {*active_children()} == before
