@@ -24,8 +24,8 @@ import typer
 
 from foosim.common.errors import BadValue, Failed
 from foosim.common.names import NAME_RULE, is_name
-from foosim.runtime.children import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, child_environment, script
 from foosim.runtime.command import DONE, new_app
+from foosim.runtime.process import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, child_environment, script
 from foosim.runtime.run_folder import hosted_folder
 
 TAKE_OVER_S: Final = 10.0

@@ -38,7 +38,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import RetryTimer
-from foosim.runtime.closed import closed
+from foosim.runtime.roles.standstill import closed
 from foosim.supervisor.failover import Failover, lacks_inputs, why_it_ends
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.load_balancing import Balancer

@@ -21,8 +21,8 @@ from foosim.launcher import pki as certificates
 from foosim.launcher import plan
 from foosim.launcher.plan import check_rooms
 from foosim.protocol.identity import identities_of
+from foosim.runtime.command import summary_of
 from foosim.runtime.disk import free_bytes
-from foosim.runtime.help_text import summary_of
 from foosim.runtime.run_folder import runs_folder
 from tests.apart import apart
 from tests.conftest import Command, Typed

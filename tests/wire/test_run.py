@@ -24,7 +24,7 @@ from foosim.library.table.settings import LINE_NAMES, TEAMS
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
-from foosim.runtime.closed import CLOSED
+from foosim.runtime.roles.standstill import CLOSED
 from foosim.runtime.transport.inbox import Inbox
 from foosim.simulation.verify import verify_capture
 from foosim.world.frame import frame_from_bytes
