@@ -104,7 +104,7 @@ class SupervisorCore:
             Inquiry: self.requests.on_inquiry,
             Farewell: self.handshake.on_farewell,
         }
-        if history is not None and history.epoch is not None:
+        if history is not None and history.kept.epoch:
             self.failover.begin(history, now_ns)
         self.actions.append(Journal(encode(state.run_record) if history is None else state.checkpoint()))
 

@@ -266,6 +266,6 @@ def _history(
         history = fold(deployment, read_records())
     except (JournalError, Malformed) as error:
         raise Refused(f"run {folder.name} cannot be resumed: {error}") from None
-    if history.run.deployment != settings.deployment_text:
+    if history.kept.run.deployment != settings.deployment_text:
         raise Refused(f"run {folder.name} was started with another deployment than {settings.deployment_name} is now")
     return history
