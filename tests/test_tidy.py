@@ -26,7 +26,6 @@ LINES_OF_A_FUNCTION_MAX = 70
 ORDER: list[set[str]] = [
     {"cli", "door"},
     {"console"},
-    {"process"},
     {"launcher", "simulation"},
     {"analysis", "fitting"},
     {"vhub", "library"},
@@ -146,8 +145,8 @@ SHELLS = {
     "runtime/run_folder.py",
     "launcher/run_options.py",
     "cli/roles.py",
+    "cli/run.py",
     "launcher/commands.py",
-    "process/roles.py",
     "launcher/up.py",
     "capture/start_frame.py",
     "capture/contents.py",

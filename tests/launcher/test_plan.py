@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from foosim.cli import main
+from foosim.cli import main, run
 from foosim.common import wall_clock
 from foosim.common.addresses import Address
 from foosim.common.errors import Refused
@@ -19,9 +19,7 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import Up
 from foosim.library.table.settings import table_of
-from foosim.runtime.run_folder import RunFolder
-from foosim.supervisor import main as supervisor_main
-from foosim.supervisor.settings import RunSettings
+from foosim.protocol.channels import SUPERVISOR
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 EVERYTHING = RunOptions(
@@ -62,19 +60,13 @@ def test_the_supervisors_process_makes_the_same_plan(
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["foosim", "run", *options.arguments(), "--run", "mine"])
     served: list[Any] = []
-
-    def serve(settings: RunSettings, address: Address, pki: Path | None, folder: RunFolder, *others: Any) -> int:
-        served.extend((settings, address, pki, folder.name))
-        return 0
-
-    monkeypatch.setattr(supervisor_main, "serve", serve)
+    monkeypatch.setattr(run, "run_roles", lambda *given, **more: served.extend((*given, more)) or 0)
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 0
-    settings, address, pki, name = served
-    plan = make_plan(options)
-    assert name == "mine" and settings == plan.settings("mine") and address == plan.address
-    assert pki == (None if plan.options.pki is None else plan.options.pki.absolute())
+    name, (plan, folder), more = served
+    assert (name, folder.name, plan) == (SUPERVISOR, "mine", make_plan(options))
+    assert more == {"pki": None, "progress": None}
 
 
 def test_ports_that_are_taken_and_paths_that_are_no_text_are_refused_before_anything_is_made(

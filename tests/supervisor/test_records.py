@@ -77,7 +77,8 @@ def watched() -> Watched:
 def content(history: History) -> tuple[object, ...]:
     """Everything in a history, in a form that compares."""
     kept, frame = history
-    return kept.run, frame.tick, frame.digest, frame.layout.names, kept.epoch, kept.edits, kept.answers, kept.control
+    told = kept.epoch, kept.edits, kept.answers, kept.control, kept.owners
+    return kept.run, frame.tick, frame.digest, frame.layout.names, *told
 
 
 def test_a_fold_of_all_records_gives_the_last_commit_and_every_answer(watched: Watched) -> None:
