@@ -14,12 +14,13 @@ from typing import Final
 
 from foosim.common.new_run import new_run_text
 from foosim.protocol import channels
+from foosim.protocol.barrier import committed_frame
 from foosim.protocol.codec import decode
 from foosim.protocol.hub_messages import ResumeState
 from foosim.protocol.messages import Commit, Epoch
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.progress import ClosingMonitor
-from foosim.supervisor.records import History, close_outages, frame_of
+from foosim.supervisor.records import History, close_outages
 from foosim.supervisor.state import RunState
 
 REJOIN_NS: Final = 1_000_000_000
@@ -155,7 +156,7 @@ class Failover:
     def _catch_up(self, standing: ResumeState) -> None:
         """Continue from the vHub's last commit. Raises Malformed for one that does not fit its frame."""
         state = self._state
-        frame = frame_of(standing.commit, state.frame.layout, channels.VHUB)
+        frame = committed_frame(decode(Commit, standing.commit), state.frame.layout)
         # A commit that the journal lost has reported the open outages, with their length: they are not reported again.
         close_outages(state.recovered, state.committed_ns, state.committed_ns)
         state.catch_up(frame, standing.chain, standing.commit)

@@ -18,12 +18,12 @@ from foosim.common.errors import Malformed
 from foosim.common.histogram import Lags
 from foosim.deployment.schema import Deployment
 from foosim.protocol import messages
-from foosim.protocol.barrier import Barrier
+from foosim.protocol.barrier import Barrier, committed_frame
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, End, Epoch
 from foosim.world.assembly.initial_state import first_chain, first_frame
 from foosim.world.edits import Disrupt, Edit
-from foosim.world.frame import Frame, chain_next, frame_from_bytes
+from foosim.world.frame import Frame, chain_next
 from foosim.world.layout import Layout
 from foosim.world.start import Start
 
@@ -253,16 +253,9 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
     if kept is None:
         raise Malformed("a journal of the supervisor without a record")
     frame = first_frame(deployment, kept.run.start)
-    return History(kept, frame_of(kept.commits[-1], frame.layout, "supervisor's journal") if kept.commits else frame)
-
-
-def frame_of(commit: bytes, layout: Layout, whose: str) -> Frame:
-    """Return the frame of a commit. Raises Malformed, with `whose` it is, for one that does not fit its frame."""
-    about = decode(Commit, commit)
-    frame = frame_from_bytes(about.tick, layout, about.values, about.outboxes)
-    if frame.digest != about.digest:
-        raise Malformed(f"commit {about.tick} of the {whose} has another digest than its frame")
-    return frame
+    if kept.commits:
+        frame = committed_frame(decode(Commit, kept.commits[-1]), frame.layout)
+    return History(kept, frame)
 
 
 def _begin(deployment: Deployment, run: RunRecord) -> Checkpoint:
