@@ -94,15 +94,13 @@ def test_a_fold_of_all_records_gives_the_last_commit_and_every_answer(watched: W
 
 
 def test_a_request_is_in_the_journal_before_the_tick_at_which_it_takes_effect(watched: Watched) -> None:
-    pushed = watched.answers["request-1"]
-    cut = next(
-        count
-        for count in range(1, len(watched.records))
-        if pushed in fold(DEPLOYMENT, watched.records[:count]).kept.answers
-    )
-    history = fold(DEPLOYMENT, watched.records[:cut])
-    assert history.frame.tick <= pushed.tick
-    assert [edit.name for edit in history.kept.edits[pushed.tick] if isinstance(edit, Push)] == ["ball"]
+    pushed, moved = watched.answers["request-1"], watched.answers["request-3"]
+    folds = (fold(DEPLOYMENT, watched.records[:count]) for count in range(1, len(watched.records)))
+    kept, frame = next(history for history in folds if pushed in history.kept.answers)
+    assert frame.tick <= pushed.tick
+    assert [edit.name for edit in kept.edits[pushed.tick] if isinstance(edit, Push)] == ["ball"]
+    kept = next(history.kept for history in folds if moved in history.kept.answers)
+    assert kept.owners["red.goal"] == "blue" != dict(decode(Epoch, kept.epoch).owners)["red.goal"]
 
 
 def test_a_further_file_says_what_the_ones_before_said(watched: Watched) -> None:
