@@ -60,7 +60,12 @@ def test_the_supervisors_process_makes_the_same_plan(
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["foosim", "run", *options.arguments(), "--run", "mine"])
     served: list[Any] = []
-    monkeypatch.setattr(run, "run_roles", lambda *given, **more: served.extend((*given, more)) or 0)
+
+    def serve(*given: object, **more: object) -> int:
+        served.extend((*given, more))
+        return 0
+
+    monkeypatch.setattr(run, "run_roles", serve)
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 0
