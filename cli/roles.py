@@ -22,7 +22,7 @@ app = new_app()
 
 @app.command()
 def process(  # noqa: PLR0913, PLR0917  # a command's options
-    name: Annotated[str, typer.Argument(help="Name of the process, for its log.", show_default=False)],
+    name: Annotated[str, typer.Argument(help="Name of the process, for its log.")],
     run: Annotated[
         str | None, typer.Option("--run", help="Run the supervisor of this run, as it was launched.")
     ] = None,

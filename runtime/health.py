@@ -82,7 +82,7 @@ def probe_file(path: Path, within: str) -> int:
 
 @app.command()
 def probe(
-    path: Annotated[Path, typer.Argument(metavar="PATH", help="The process's --progress-file.", show_default=False)],
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="The process's --progress-file.")],
     within: Annotated[str, typer.Option(help="Maximum age of the last progress.")] = "5s",
 ) -> None:
     """Check whether the main loop of a process advances, as a health check on its machine or in its container.
