@@ -22,6 +22,7 @@ from foosim.simulation.run import rehearse, with_nodes
 from foosim.simulation.system import IDLE_NS_MAX, OPERATOR, Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
+from foosim.vhub.wait_times import WaitTimes
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
 from foosim.world.robot_packets import RobotPacket
@@ -91,6 +92,7 @@ def test_each_kind_of_process_delayed_is_named_in_the_lag_line(process: str, del
 
 def test_a_run_in_time_names_nobody() -> None:
     seen = Seen().go()
+    seen.system.supervisor.progress.on_heartbeat(replace(seen.system.hub.heartbeat(), waiting_for="commit"))
     assert set(seen.late.values()) == {""} and not [line for line in seen.lines if "lag" in line]
     assert seen.system.supervisor.status(0)["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
 
@@ -383,3 +385,27 @@ def test_nobody_is_overdue_while_the_run_is_paused() -> None:
     system.run()
     assert system.supervisor.state.frame.tick == TICKS and system.answers["resume"].accepted
     assert lines == [f"run ends at tick {TICKS}: done"]
+
+
+@pytest.mark.parametrize(
+    ("samples_ms", "done_ms", "busy_ms", "least_ms", "cause"),
+    [
+        (15, 18, 0, 1, "samples of n2"),
+        (12, 18, 0, 1, "Done of player-red"),
+        (10, 10, 0, 1, ""),
+        (12, 15, 0, 4, ""),
+        (10, 20, 10, 1, ""),
+        (10, 20, 3, 7, "Done of player-red"),
+    ],
+)
+def test_the_vhub_names_whom_it_waited_for_longest(
+    samples_ms: int, done_ms: int, busy_ms: int, least_ms: int, cause: str
+) -> None:
+    """If that was long enough to matter, and without the time in which it was busy itself."""
+    waits = WaitTimes()
+    waits.node, waits.client = "n2", "player-red"
+    waits.begin(10 * MS)
+    waits.begin(11 * MS)
+    waits.close_world(samples_ms * MS)
+    waits.took(samples_ms * MS, (samples_ms + busy_ms) * MS)
+    assert waits.close(done_ms * MS, least_ms * MS) == cause
