@@ -14,7 +14,7 @@ from statistics import median
 
 from bench.distributed import cost_text, memory_text
 from bench.runs import BenchError, ProcessCost, Watched, watch
-from foosim.runtime.children import script
+from foosim.runtime.process import script
 
 
 @dataclass(frozen=True, slots=True)

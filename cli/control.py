@@ -53,7 +53,7 @@ def step(
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def rate(
-    pace: Annotated[str, typer.Argument(help="realtime, fast, or a factor such as 2x.", show_default=False)],
+    pace: Annotated[str, typer.Argument(help="realtime, fast, or a factor such as 2x.")],
     run: RunOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -67,9 +67,7 @@ Numbers = tuple[float, float, float]
 
 @app.command()
 def add(
-    name: Annotated[
-        str, typer.Argument(metavar="ENTITY", help="A spare, or a fleet: then its first spare.", show_default=False)
-    ],
+    name: Annotated[str, typer.Argument(metavar="ENTITY", help="A spare, or a fleet: then its first spare.")],
     at: Annotated[str | None, typer.Option(metavar="X,Y[,Z]", help="Where, in m; else where it is declared.")] = None,
     yaw: Annotated[str | None, typer.Option(metavar="ANGLE", help="Its heading, such as `90 deg`.")] = None,
     node: Annotated[str | None, typer.Option(help="The node that owns it from now on; of robots.")] = None,
@@ -87,9 +85,7 @@ def add(
 
 @app.command()
 def remove(
-    name: Annotated[str, typer.Argument(help="Which entity.", show_default=False)],
-    run: RunOption = None,
-    json: JsonOption = False,
+    name: Annotated[str, typer.Argument(help="Which entity.")], run: RunOption = None, json: JsonOption = False
 ) -> None:
     """Remove an entity from the world; it can be added again."""
     show_answer(control.request("remove", run, name=name), json)
@@ -97,8 +93,8 @@ def remove(
 
 @app.command()
 def move(
-    robot: Annotated[str, typer.Argument(help="Which robot.", show_default=False)],
-    node: Annotated[str, typer.Argument(help="To which node.", show_default=False)],
+    robot: Annotated[str, typer.Argument(help="Which robot.")],
+    node: Annotated[str, typer.Argument(help="To which node.")],
     run: RunOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -112,7 +108,7 @@ def balance(run: RunOption = None, json: JsonOption = False) -> None:
     show_answer(control.request("balance", run), json)
 
 
-Node = Annotated[str, typer.Argument(help="Which node.", show_default=False)]
+Node = Annotated[str, typer.Argument(help="Which node.")]
 
 
 @app.command()
@@ -133,9 +129,7 @@ def start(node: Node, run: RunOption = None, json: JsonOption = False) -> None:
 
 @app.command(context_settings={"ignore_unknown_options": True})  # so that a negative number is no option
 def push(
-    impulse: Annotated[
-        list[str], typer.Argument(metavar="X Y Z", help="Impulse in N s along x, y and z.", show_default=False)
-    ],
+    impulse: Annotated[list[str], typer.Argument(metavar="X Y Z", help="Impulse in N s along x, y and z.")],
     name: Annotated[str | None, typer.Option(help="Which free body; by default the first by name.")] = None,
     run: RunOption = None,
     json: JsonOption = False,
@@ -149,10 +143,8 @@ def push(
 
 @app.command(name="set")
 def set_field(
-    name: Annotated[str, typer.Argument(metavar="ENTITY", help="Which entity.", show_default=False)],
-    setting: Annotated[
-        str, typer.Argument(metavar="FIELD=VALUE", help="What, and to which value.", show_default=False)
-    ],
+    name: Annotated[str, typer.Argument(metavar="ENTITY", help="Which entity.")],
+    setting: Annotated[str, typer.Argument(metavar="FIELD=VALUE", help="What, and to which value.")],
     run: RunOption = None,
     json: JsonOption = False,
 ) -> None:

@@ -23,7 +23,7 @@ MARKS = {"fine": "ok", "warning": "!", "problem": "NO"}
 
 @app.command()
 def doctor(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")],
     listen: Annotated[
         str | None, typer.Option(help="HOST[:PORT] of the supervisor; by default the deployment's.")
     ] = None,

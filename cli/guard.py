@@ -24,15 +24,15 @@ import typer
 
 from foosim.common.errors import BadValue, Failed
 from foosim.common.names import NAME_RULE, is_name
-from foosim.runtime.children import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, child_environment, script
 from foosim.runtime.command import DONE, new_app
+from foosim.runtime.process import BY_SIGNAL, GRACE_S, GUARD, OTHER_VERSION, child_environment, script
 from foosim.runtime.run_folder import hosted_folder
 
 TAKE_OVER_S: Final = 10.0
 
-Run = Annotated[str, typer.Argument(help="Which run.", show_default=False)]
+Run = Annotated[str, typer.Argument(help="Which run.")]
 VersionOfLauncher = Annotated[str, typer.Option(help="Refuse another version of foosim than this.")]
-File = Annotated[str, typer.Argument(help="Which file of the run's folder.", show_default=False)]
+File = Annotated[str, typer.Argument(help="Which file of the run's folder.")]
 
 
 def run_folder(run: str) -> Path:
@@ -135,8 +135,8 @@ def guard_group() -> None:
 @app.command("run", context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
 def run_command(
     run: Run,
-    name: Annotated[str, typer.Argument(help="Which process of it.", show_default=False)],
-    command: Annotated[list[str], typer.Argument(help="What to start.", show_default=False)],
+    name: Annotated[str, typer.Argument(help="Which process of it.")],
+    command: Annotated[list[str], typer.Argument(help="What to start.")],
     version_of_launcher: VersionOfLauncher = "",
 ) -> None:
     """Run a process of a run until standard input ends."""

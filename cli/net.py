@@ -66,10 +66,7 @@ def net_group() -> None:
 @app.command()
 def lint(
     file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="A deployment, or a file with its network section alone.", show_default=False
-        ),
+        Path, typer.Argument(metavar="FILE", help="A deployment, or a file with its network section alone.")
     ],
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the file; may be repeated.")] = None,
     json: JsonOption = False,
@@ -121,7 +118,7 @@ def linted(file: Path, sets: list[str]) -> tuple[list[LinkSummary], bool]:
 
 @app.command()
 def presets(
-    name: Annotated[str | None, typer.Argument(help="Name of a preset; by default all.", show_default=False)] = None,
+    name: Annotated[str | None, typer.Argument(help="Name of a preset; by default all.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Print the values of presets, the numbers of their media, and the source of each.
@@ -148,11 +145,8 @@ def presets(
 
 @app.command()
 def explain(
-    capture: Annotated[Path, typer.Argument(metavar="CAPTURE", help="A capture.", show_default=False)],
-    packet: Annotated[
-        str,
-        typer.Argument(metavar="PACKET", help="SOURCE:SEQUENCE[:DESTINATION[:COPY]].", show_default=False),
-    ],
+    capture: Annotated[Path, typer.Argument(metavar="CAPTURE", help="A capture.")],
+    packet: Annotated[str, typer.Argument(metavar="PACKET", help="SOURCE:SEQUENCE[:DESTINATION[:COPY]].")],
     json: JsonOption = False,
 ) -> None:
     """Print the stages of a captured packet with their numbers, and its fate.
@@ -234,10 +228,8 @@ def _say(console: Console, line: str) -> None:
 
 @app.command("set")
 def set_link(
-    link: Annotated[str, typer.Argument(help="The id of a link rule.", show_default=False)],
-    settings: Annotated[
-        list[str], typer.Argument(metavar="KEY=VALUE...", help="e.g. loss=5% delay='20 ms'.", show_default=False)
-    ],
+    link: Annotated[str, typer.Argument(help="The id of a link rule.")],
+    settings: Annotated[list[str], typer.Argument(metavar="KEY=VALUE...", help="e.g. loss=5% delay='20 ms'.")],
     run: RunOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -252,10 +244,7 @@ def set_link(
 @app.command()
 def partition(
     groups: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="GROUP GROUP...", help="Endpoints with commas, or rest for all others.", show_default=False
-        ),
+        list[str], typer.Argument(metavar="GROUP GROUP...", help="Endpoints with commas, or rest for all others.")
     ],
     lasts: Lasts = None,
     random: Random = False,
@@ -270,8 +259,8 @@ def partition(
 
 @app.command()
 def clog(
-    source: Annotated[str, typer.Argument(metavar="FROM", help="Endpoints, with commas.", show_default=False)],
-    destination: Annotated[str, typer.Argument(metavar="TO", help="Endpoints, with commas.", show_default=False)],
+    source: Annotated[str, typer.Argument(metavar="FROM", help="Endpoints, with commas.")],
+    destination: Annotated[str, typer.Argument(metavar="TO", help="Endpoints, with commas.")],
     lasts: Lasts = None,
     random: Random = False,
     run: RunOption = None,

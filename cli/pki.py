@@ -25,7 +25,7 @@ from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 
 app = new_app()
 
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of certificates.", show_default=False)]
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of certificates.")]
 Days = Annotated[int, typer.Option(help="Validity of a new certificate, in days.")]
 
 
@@ -46,7 +46,7 @@ def pki_group() -> None:
 @app.command()
 def init(
     folder: Folder,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")],
     host: Annotated[
         list[str] | None,
         typer.Option(help="A name or address of this machine, for supervisor and vHub; may be repeated."),
@@ -92,9 +92,7 @@ def _is_sent(deployment: Deployment, folder: Path) -> bool:
 @app.command()
 def client(
     folder: Folder,
-    name: Annotated[
-        list[str], typer.Argument(metavar="NAME...", help="Names of clients, as in the deployment.", show_default=False)
-    ],
+    name: Annotated[list[str], typer.Argument(metavar="NAME...", help="Names of clients, as in the deployment.")],
     days: Days = LEAF_DAYS,
 ) -> None:
     """Create a certificate and key for a client, client.NAME.pem and client.NAME.key.

@@ -6,15 +6,14 @@ from typing import Annotated
 
 import typer
 
+from foosim.cli.run import run_roles
 from foosim.client.loading import look_in
 from foosim.common.addresses import check_listen
 from foosim.common.errors import BadValue
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import launched_options
-from foosim.process.roles import run_roles
 from foosim.runtime.command import PathOption, PkiOption, new_app
 from foosim.runtime.health import ProgressOption
-from foosim.runtime.process import die_with_parent
 from foosim.runtime.run_folder import open_run
 from foosim.vhub.main import CaptureOption, InsecureOption, NoCaptureOption, RunFolderOption, read_options
 
@@ -23,7 +22,7 @@ app = new_app()
 
 @app.command()
 def process(  # noqa: PLR0913, PLR0917  # a command's options
-    name: Annotated[str, typer.Argument(help="Name of the process, for its log.", show_default=False)],
+    name: Annotated[str, typer.Argument(help="Name of the process, for its log.")],
     run: Annotated[
         str | None, typer.Option("--run", help="Run the supervisor of this run, as it was launched.")
     ] = None,
@@ -49,7 +48,6 @@ def process(  # noqa: PLR0913, PLR0917  # a command's options
 
     Exit codes: 0 the run ended, 1 it failed, 3 refused.
     """
-    die_with_parent()
     if not (run or vhub_listen or node or player):
         raise BadValue("a role is missing: --run, --vhub-listen, --node or --player", name)
     if path is not None:

@@ -5,8 +5,8 @@ The module of a verb is imported when the verb is called, so that help and compl
 
 from __future__ import annotations
 
-import ast
 import os
+import re
 import sys
 from collections.abc import Mapping
 from importlib import import_module
@@ -17,8 +17,7 @@ from typing import Any, ClassVar, Final
 import typer
 from typer.core import CompletionItem  # type: ignore[attr-defined]  # typer makes no name of it public
 
-from foosim.runtime.command import VersionOption, new_app, run_app
-from foosim.runtime.help_text import Group
+from foosim.runtime.command import Group, VersionOption, new_app, run_app
 
 WELCOME: Final = """\
 foosim simulates robots, the network between them, and the programs that control them.
@@ -31,6 +30,10 @@ foosim simulates robots, the network between them, and the programs that control
 `foosim --help` lists all commands, `foosim COMMAND --help` explains one.
 """
 
+COMMAND: Final = re.compile(
+    r'^@app\.c\w+\((?:(?:name=)?"([^"]*)")?.*?^def (\w+)\(.*?^    """(.*?)(?:\n\n|""")', re.M | re.S
+)
+"""A command in the source of a module: its name, that of its function, the first paragraph of its help."""
 COMPLETING: Final = "_FOOSIM_COMPLETE"
 """Set by a shell to complete a word."""
 
@@ -80,15 +83,8 @@ def summary(name: str, where: str) -> str:
     """Return the first paragraph of a verb's help, from the source of its module, without importing it."""
     spec = find_spec(f"foosim.{where.partition(':')[0]}")
     assert spec is not None and spec.origin is not None, where
-    found: dict[str, str | None] = {}
-    for node in ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body:
-        for decorator in node.decorator_list if isinstance(node, ast.FunctionDef) else ():
-            if isinstance(node, ast.FunctionDef) and isinstance(decorator, ast.Call):
-                kind, own = ast.unparse(decorator.func), [*decorator.args, *(one.value for one in decorator.keywords)]
-                names = [str(one.value) for one in own if isinstance(one, ast.Constant)]
-                found[kind if kind == "app.callback" else (names or [node.name])[0]] = ast.get_docstring(node)
-    text = found.get(name, found.get("app.callback", next(iter(found.values())))) or ""
-    return " ".join(text.partition("\n\n")[0].split())
+    found = {title or own: text for title, own, text in COMMAND.findall(Path(spec.origin).read_text(encoding="utf-8"))}
+    return " ".join((found.get(name) or next(iter(found.values()))).split())
 
 
 class Foosim(Verbs):

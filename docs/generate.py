@@ -22,7 +22,7 @@ from foosim.cli.verbs import Foosim
 from foosim.common import limits, units
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.protocol.channels import CHANNELS
-from foosim.runtime.help_text import shown_argument
+from foosim.runtime.command import shown_argument
 
 DOCS: Final = Path(__file__).parent
 DEADLINES: Final[Mapping[str, tuple[str, str]]] = {
@@ -116,7 +116,7 @@ CONSTANTS: Final[Mapping[tuple[str, str], tuple[str, str]]] = {
     ("launcher.up", "LEAVE_S"): ("`up`", "the end of the other processes after the supervisor's; then they are ended"),
     ("launcher.up", "AWAY_S"): ("`up`", "the same on other machines"),
     ("launcher.console_child", "LEAVE_S"): ("`up`", "the console to report the end of the run to its pages"),
-    ("runtime.children", "GRACE_S"): ("`up`, `foosim guard`", "a process after SIGTERM; then it is killed"),
+    ("runtime.process", "GRACE_S"): ("`up`, `foosim guard`", "a process after SIGTERM; then it is killed"),
     ("cli.guard", "TAKE_OVER_S"): ("`foosim guard`", "the end of the previous guard"),
     ("client.control", "CONNECT_S"): ("commands", "a connection to the supervisor; then they fail"),
     ("client.control", "ANSWER_S"): ("commands", "an answer of the supervisor; then they fail"),

@@ -41,9 +41,7 @@ WRITTEN: Final = {
 
 @app.command(name="fit")
 def fit_command(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="TRACKS...", help="CSV files with tracks of the ball.", show_default=False)
-    ],
+    files: Annotated[list[Path], typer.Argument(metavar="TRACKS...", help="CSV files with tracks of the ball.")],
     table: Annotated[
         Path, typer.Option("--table", help="A deployment with the table: its measures, and what the fit begins with.")
     ],

@@ -32,8 +32,8 @@ from foosim.launcher.plan import (
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import Up
 from foosim.protocol.channels import VHUB
-from foosim.runtime.children import FOOSIM, script
 from foosim.runtime.command import DONE
+from foosim.runtime.process import FOOSIM, script
 from foosim.runtime.run_folder import RunFolder, create_run, left_runs, runs_folder
 
 POLL_S: Final = 0.05

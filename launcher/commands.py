@@ -16,7 +16,7 @@ from foosim.deployment.schema import Deployment
 from foosim.launcher.hosts import CAPTURE, Remote
 from foosim.launcher.plan import Plan
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.runtime.children import FOOSIM, ROLE
+from foosim.runtime.process import FOOSIM, ROLE
 from foosim.runtime.roles.shell import RUN
 from foosim.runtime.run_folder import RunFolder, RunInfo
 

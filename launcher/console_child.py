@@ -16,7 +16,7 @@ from foosim.common.errors import BadValue, Failed, read_at
 from foosim.common.units import parse_offset_ns
 from foosim.launcher.display import Display
 from foosim.launcher.processes import Launcher
-from foosim.runtime.children import FOOSIM
+from foosim.runtime.process import FOOSIM
 from foosim.runtime.run_folder import UNREADABLE, RunFolder
 
 CONSOLE: Final = "console"

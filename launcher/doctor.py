@@ -55,7 +55,7 @@ from foosim.launcher.plan import place_of
 from foosim.protocol import identity
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.fingerprint import is_compiled, library_fingerprint
-from foosim.runtime.children import FOOSIM, OTHER_VERSION, script
+from foosim.runtime.process import FOOSIM, OTHER_VERSION, script
 from foosim.runtime.run_folder import hosted_folder, runs_folder
 from foosim.runtime.transport.certificate_files import hosts_of, read_ca, read_certificate
 from foosim.runtime.transport.certificate_folder import CA_FILE, CA_KEY_FILE, KEY_SUFFIX, CertificateError

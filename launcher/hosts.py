@@ -28,7 +28,7 @@ from foosim.common.addresses import Address, parse_address
 from foosim.common.errors import Failed, Refused
 from foosim.deployment.hosts import Host
 from foosim.deployment.schema import Deployment, places
-from foosim.runtime.children import BY_SIGNAL, FOOSIM, GUARD, OTHER_VERSION
+from foosim.runtime.process import BY_SIGNAL, FOOSIM, GUARD, OTHER_VERSION
 
 SSH_FAILED: Final = 255
 NOT_FOUND: Final = 127

@@ -25,9 +25,8 @@ from typing import Any, Final, NamedTuple
 
 from foosim.common.errors import Failed
 from foosim.launcher.hosts import Remote
-from foosim.runtime.children import BY_SIGNAL, GRACE_S, ROLE, child_environment, script
 from foosim.runtime.command import REFUSED
-from foosim.runtime.process import STACK_SIGNAL
+from foosim.runtime.process import BY_SIGNAL, GRACE_S, ROLE, STACK_SIGNAL, child_environment, script
 from foosim.world.forms.failures import in_library
 
 _VMSTAT: Final = Path("/proc/vmstat")

@@ -18,7 +18,7 @@ from foosim.runtime.run_folder import LAUNCH_FILE, Launch, RunFolder
 class RunOptions:
     """How to run a deployment file, texts as a person types them. Each field is an option of the commands."""
 
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.", show_default=False)]
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The deployment file.")]
     pace: Annotated[str | None, typer.Option("--pace", help="realtime, fast, or a factor such as 2x.")] = None
     duration: Annotated[str | None, typer.Option("--for", help="End after this much simulated time, e.g. 20s.")] = None
     seed: Annotated[int | None, typer.Option("--seed", help="Seed of all random draws; short for --set seed=N.")] = None

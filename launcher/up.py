@@ -33,8 +33,8 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.early_signals import handling
 from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
+from foosim.runtime.transport.admission import Exposure
 from foosim.runtime.transport.certificates import operator_credentials
-from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import ConnectError
 
 POLL_S: Final = 0.02

@@ -23,7 +23,7 @@ from foosim.node.inputs import Inputs, PendingEpochMessages, check_near
 from foosim.node.tick import Stepper, Term, Work
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Log, Publish
-from foosim.protocol.barrier import BadParts, Barrier, input_digest_of
+from foosim.protocol.barrier import BadParts, Barrier, committed_frame, input_digest_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
 from foosim.protocol.handshake import Member, NotValidHere, failed_form, sendable
@@ -46,7 +46,7 @@ from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import RetryTimer
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.components.view import ComponentError
-from foosim.world.frame import Frame, frame_from_bytes
+from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Outbox
 
@@ -482,19 +482,13 @@ class NodeCore:
             self._repeated += 1
             return
         assert self.member.layout is not None
-        frame = frame_from_bytes(commit.tick, self.member.layout, commit.values, commit.outboxes)
-        if frame.digest != epoch.digest:
-            raise Malformed(f"commit {commit.tick} whose frame has another digest")
-        self._resume(frame, now_ns)
+        self._resume(committed_frame(commit, self.member.layout), now_ns)
 
     def _take_old_frame(self, commit: Commit) -> None:
         """Take a frame to sample."""
         assert self.member.layout is not None
-        frame = frame_from_bytes(commit.tick, self.member.layout, commit.values, commit.outboxes)
-        if frame.digest != commit.digest:
-            raise Malformed(f"commit {commit.tick} whose frame has another digest")
+        self._history[commit.tick] = committed_frame(commit, self.member.layout)
         self._unsampled.discard(commit.tick)
-        self._history[commit.tick] = frame
         self._sample_again(commit.tick)
 
     def _resume(self, frame: Frame, now_ns: int) -> None:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.protocol.codec import decode_any, encode
-from foosim.protocol.messages import Part
+from foosim.protocol.messages import Commit, Part
 from foosim.world.edits import Edit
-from foosim.world.frame import Frame
+from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.layout import Layout
 from foosim.world.robot_packets import OutboxPacket
 
@@ -41,6 +41,14 @@ def input_digest_of(digest: bytes, edits: Sequence[Edit], deliveries: bytes) -> 
     hasher.update(_TICK.pack(len(content)) + content)
     hasher.update(deliveries)
     return hasher.digest()
+
+
+def committed_frame(commit: Commit, layout: Layout) -> Frame:
+    """Return the frame of a commit. Raises Malformed where it does not fit the layout or the commit's digest."""
+    frame = frame_from_bytes(commit.tick, layout, commit.values, commit.outboxes)
+    if frame.digest != commit.digest:
+        raise Malformed(f"commit {commit.tick} has another digest than its frame")
+    return frame
 
 
 class BadParts(Malformed):

@@ -1,5 +1,7 @@
 """Around the loop of every process: it dies with its parent, logs lines, and ends in order on a signal.
 
+Launcher and guard have from here how a child is started: the path of its command and its environment.
+
 The environment names the launcher of a child. The kernel signals the end of the launcher to the child, and a thread
 reads a pipe that only the launcher can write: its end has the same meaning where the kernel has no such signal.
 """
@@ -10,8 +12,10 @@ import ctypes
 import faulthandler
 import logging
 import os
+import shutil
 import signal
 import sys
+import sysconfig
 import threading
 import time
 from collections.abc import Callable
@@ -23,6 +27,17 @@ PARENT_VARIABLE: Final = "FOOSIM_PARENT"
 STACK_SIGNAL: Final = signal.SIGUSR1
 STDERR: Final = 2
 _PR_SET_PDEATHSIG: Final = 1
+GRACE_S: Final = 5.0
+"""How long a child has after SIGTERM before it is killed."""
+FOOSIM: Final = "foosim"
+"""The command, whose verbs are the processes of a run, too."""
+ROLE: Final = (FOOSIM, "role")
+GUARD: Final = "foosim guard"
+"""How lines of a guard begin."""
+BY_SIGNAL: Final = 128
+"""The exit code of a guard is this plus the number of the signal that ended its process."""
+OTHER_VERSION: Final = 125
+"""The exit code of a guard of another version than the launcher."""
 
 
 def die_with_parent() -> None:
@@ -58,6 +73,22 @@ def _watch(pipe: int) -> None:
     """Wait for the end of a pipe to which nothing is written."""
     os.read(pipe, 1)
     os._exit(1)
+
+
+def script(name: str = FOOSIM) -> str:
+    """Return the path of a command, by default foosim: beside this Python, else on PATH."""
+    beside = Path(sysconfig.get_path("scripts")) / name
+    return str(beside) if beside.is_file() else shutil.which(name) or name
+
+
+def child_environment(pipe: int) -> dict[str, str]:
+    """Return the environment of a child of this process that is to die with it; `pipe` ends when this process does."""
+    return {
+        **os.environ,
+        PARENT_VARIABLE: f"{os.getpid()}:{pipe}",
+        "OPENBLAS_NUM_THREADS": "1",  # nothing here uses BLAS; its threads only take memory
+        "PYTHONUNBUFFERED": "1",
+    }
 
 
 def start_log(name: str) -> logging.Logger:

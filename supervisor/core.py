@@ -38,7 +38,7 @@ from foosim.protocol.messages import (
 )
 from foosim.protocol.rejects import Refusals
 from foosim.protocol.retry import RetryTimer
-from foosim.runtime.closed import closed
+from foosim.runtime.roles.standstill import closed
 from foosim.supervisor.failover import Failover, lacks_inputs, why_it_ends
 from foosim.supervisor.handshake import Handshake
 from foosim.supervisor.load_balancing import Balancer
@@ -104,7 +104,7 @@ class SupervisorCore:
             Inquiry: self.requests.on_inquiry,
             Farewell: self.handshake.on_farewell,
         }
-        if history is not None and history.epoch is not None:
+        if history is not None and history.kept.epoch:
             self.failover.begin(history, now_ns)
         self.actions.append(Journal(encode(state.run_record) if history is None else state.checkpoint()))
 

@@ -14,9 +14,10 @@ from typing import Final
 
 from foosim.common.new_run import new_run_text
 from foosim.protocol import channels
+from foosim.protocol.barrier import committed_frame
 from foosim.protocol.codec import decode
 from foosim.protocol.hub_messages import ResumeState
-from foosim.protocol.messages import Commit
+from foosim.protocol.messages import Commit, Epoch
 from foosim.supervisor.node_loss import NodeLoss
 from foosim.supervisor.progress import ClosingMonitor
 from foosim.supervisor.records import History, close_outages
@@ -79,11 +80,12 @@ class Failover:
         self._living_ns = now_ns + deadlines.heartbeat_ns + REJOIN_NS
         self._start_ns = now_ns + deadlines.start_ns
         self._hub_ns = now_ns + max(deadlines.orphan_ns, deadlines.start_ns)
-        self._roster = [] if history.epoch is None else list(history.epoch.roster)
-        self._owners = history.owners
-        if history.run.clock != state.clock:
-            history.started_ns += now_ns - history.committed_ns
-            history.committed_ns = now_ns
+        kept = history.kept
+        self._roster = decode(Epoch, kept.epoch).roster
+        self._owners = kept.owners
+        if kept.run.clock != state.clock:
+            kept.started_ns += now_ns - kept.committed_ns
+            kept.committed_ns = now_ns
         state.restore(history)
         state.resumed()
         state.log("warning", f"started again: the journal ends at tick {state.frame.tick}, epoch {state.epoch}")
@@ -153,7 +155,8 @@ class Failover:
 
     def _catch_up(self, standing: ResumeState) -> None:
         """Continue from the vHub's last commit. Raises Malformed for one that does not fit its frame."""
-        state, frame = self._state, self._state.frame_of(standing)
+        state = self._state
+        frame = committed_frame(decode(Commit, standing.commit), state.frame.layout)
         # A commit that the journal lost has reported the open outages, with their length: they are not reported again.
         close_outages(state.recovered, state.committed_ns, state.committed_ns)
         state.catch_up(frame, standing.chain, standing.commit)

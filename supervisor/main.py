@@ -27,8 +27,8 @@ from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.disk import Level, room_on_disk
-from foosim.runtime.journal import Journal, JournalError, journal_files, remove_journal
-from foosim.runtime.process import Stop, clock_name, die_with_parent, new_boot
+from foosim.runtime.journal import Journal, JournalError, journal_files
+from foosim.runtime.process import clock_name, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell
 from foosim.runtime.run_folder import RESULT_FILE, RunFolder, RunInfo
 from foosim.runtime.transport.certificates import check_host, load_credentials, warn_of_end
@@ -202,31 +202,6 @@ class SupervisorShell:
             self.core.connection_closed(name, time.monotonic_ns())
 
 
-def serve(
-    settings: RunSettings,
-    address: Address,
-    pki: Path | None,
-    folder: RunFolder,
-    read_records: Callable[[], list[bytes]],
-    progress: Path | None = None,
-) -> int:
-    """Run the supervisor of a run in this process; return the exit code.
-
-    `read_records` returns the records of its journal, and raises Refused when it is damaged. Raises Refused before it
-    has begun.
-    """
-    die_with_parent()
-    stop = Stop()
-    process = Process(SUPERVISOR, progress)
-    with open_supervisor(process, settings, address, pki, folder, read_records) as supervisor:
-        process.add(supervisor)
-        stop.then(process.stop)
-        code = process.run()
-    if code == DONE:
-        remove_journal(folder.journals, SUPERVISOR)
-    return code
-
-
 @contextmanager
 def open_supervisor(
     process: Process,
@@ -236,9 +211,10 @@ def open_supervisor(
     folder: RunFolder,
     read_records: Callable[[], list[bytes]],
 ) -> Iterator[SupervisorShell]:
-    """Open the journal and the session of a run's supervisor, in a process; parameters and errors are those of `serve`.
+    """Open the journal and the session of a run's supervisor, in a process.
 
-    The journal stays: after a run without failure the caller removes it.
+    `read_records` returns the records of its journal, and raises Refused when it is damaged. The journal stays: after a
+    run without failure the caller removes it. Raises Refused before the run has begun.
     """
     folder.hold()
     deployment = settings.load_deployment()
@@ -266,6 +242,6 @@ def _history(
         history = fold(deployment, read_records())
     except (JournalError, Malformed) as error:
         raise Refused(f"run {folder.name} cannot be resumed: {error}") from None
-    if history.run.deployment != settings.deployment_text:
+    if history.kept.run.deployment != settings.deployment_text:
         raise Refused(f"run {folder.name} was started with another deployment than {settings.deployment_name} is now")
     return history

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -18,13 +18,12 @@ from foosim.common.errors import Malformed
 from foosim.common.histogram import Lags
 from foosim.deployment.schema import Deployment
 from foosim.protocol import messages
-from foosim.protocol.barrier import Barrier
-from foosim.protocol.codec import decode, decode_any
-from foosim.protocol.kept_answers import KeptAnswers
+from foosim.protocol.barrier import Barrier, committed_frame
+from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Answer, Commit, End, Epoch
 from foosim.world.assembly.initial_state import first_chain, first_frame
 from foosim.world.edits import Disrupt, Edit
-from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
+from foosim.world.frame import Frame, chain_next
 from foosim.world.layout import Layout
 from foosim.world.start import Start
 
@@ -180,26 +179,29 @@ class RecoveredRecord(msgspec.Struct, frozen=True, array_like=True, tag="recover
     entry: Recovered
 
 
-class Checkpoint(msgspec.Struct, frozen=True, array_like=True, tag="head", forbid_unknown_fields=True):
-    """The first record of a further journal file: what is still needed of the files before, so that they can go.
+class Checkpoint(msgspec.Struct, array_like=True, tag="head", forbid_unknown_fields=True):
+    """What is still needed of a journal's records so far: the result of a fold, and the first record of a further file,
+    so that the files before can go.
 
-    Epoch and commits are as they were published.
+    Epoch and commits are as they were published, the newest last; `edits` are those of uncommitted ticks.
+    `disruptions` are the last network events that were requested: the tick at which each takes effect, the event as
+    JSON; `requests` the last ones that change something.
     """
 
     run: RunRecord
-    epoch: bytes
-    commits: list[bytes]
-    chain: bytes
-    edits: list[tuple[int, list[Edit]]]
-    answers: list[Answer]
     owners: dict[str, str]
     control: Control
     account: Account
-    lags: Lags
-    recovered: list[Recovered]
-    started_ns: int
-    committed_ns: int
-    end: End | None
+    chain: bytes
+    epoch: bytes = b""
+    commits: list[bytes] = []
+    edits: dict[int, list[Edit]] = {}
+    answers: list[Answer] = []
+    lags: Lags = msgspec.field(default_factory=Lags)
+    recovered: list[Recovered] = []
+    started_ns: int = 0
+    committed_ns: int = 0
+    end: End | None = None
     disruptions: list[tuple[int, str]] = []
     requests: list[RequestSummary] = []
 
@@ -208,33 +210,11 @@ Change = RequestRecord | OrderedRecord | Control | CommitRecord | RecoveredRecor
 Record = RunRecord | Checkpoint | Change
 
 
-@dataclass(slots=True)
-class History:
-    """The result of folding the supervisor's journal."""
+class History(NamedTuple):
+    """The result of folding the supervisor's journal, and its last committed frame, at first that of the start."""
 
-    run: RunRecord
+    kept: Checkpoint
     frame: Frame
-    """The last committed one, at first that of the start."""
-    owners: dict[str, str]
-    control: Control
-    account: Account
-    epoch: Epoch | None = None
-    commits: dict[int, bytes] = field(default_factory=dict)
-    """The last ones, by tick, as they were published."""
-    chain: bytes = CHAIN_START
-    edits: dict[int, list[Edit]] = field(default_factory=dict)
-    """Edits of uncommitted ticks."""
-    answers: KeptAnswers = field(default_factory=lambda: KeptAnswers(ANSWERS_KEPT))
-    """By sender and id of the request."""
-    lags: Lags = field(default_factory=Lags)
-    recovered: list[Recovered] = field(default_factory=list)
-    started_ns: int = 0
-    committed_ns: int = 0
-    end: End | None = None
-    disruptions: list[tuple[int, str]] = field(default_factory=list)
-    """The last network events that were requested: the tick at which each takes effect, the event as JSON."""
-    requests: list[RequestSummary] = field(default_factory=list)
-    """The last requests that change something."""
 
 
 Solved = tuple[list[str], dict[str, str]]
@@ -259,99 +239,77 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
 
     Raises Malformed when they are not those of a run of this version.
     """
-    history: History | None = None
+    kept: Checkpoint | None = None
     for raw in records:
         record = decode_any(Record, raw)
-        if isinstance(record, RunRecord | Checkpoint):
-            history = _begin(deployment, record)
-        elif history is None:
+        if isinstance(record, Checkpoint):
+            kept = record
+        elif isinstance(record, RunRecord):
+            kept = _begin(deployment, record)
+        elif kept is None:
             raise Malformed("a journal of the supervisor that does not start with its run")
         else:
-            _apply(history, record)
-    if history is None:
+            _apply(kept, record)
+    if kept is None:
         raise Malformed("a journal of the supervisor without a record")
-    if history.commits:
-        commit = decode(Commit, history.commits[max(history.commits)])
-        history.frame = frame_from_bytes(commit.tick, history.frame.layout, commit.values, commit.outboxes)
-        if history.frame.digest != commit.digest:
-            raise Malformed(f"commit {commit.tick} of the supervisor's journal has another digest than its frame")
-    return history
+    frame = first_frame(deployment, kept.run.start)
+    if kept.commits:
+        frame = committed_frame(decode(Commit, kept.commits[-1]), frame.layout)
+    return History(kept, frame)
 
 
-def _begin(deployment: Deployment, first: RunRecord | Checkpoint) -> History:
-    """Return the history of a file's first record."""
-    if isinstance(first, RunRecord):
-        begun = 0 if first.start is None else first.start.origin.tick
-        control = Control(first.pace, False, 0, first.ticks and begun + first.ticks, [], {}, {})
-        account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
-        frame = first_frame(deployment, first.start)
-        chain = first_chain(None if first.start is None else first.start.origin)
-        return History(first, frame, deployment.owners(), control, account, chain=chain)
-    return History(
-        first.run,
-        first_frame(deployment, first.run.start),
-        first.owners,
-        first.control,
-        first.account,
-        epoch=decode(Epoch, first.epoch) if first.epoch else None,
-        commits={decode(Commit, raw).tick: raw for raw in first.commits},
-        chain=first.chain,
-        edits={tick: list(edits) for tick, edits in first.edits},
-        answers=KeptAnswers(ANSWERS_KEPT, first.answers),
-        lags=first.lags,
-        recovered=first.recovered,
-        started_ns=first.started_ns,
-        committed_ns=first.committed_ns,
-        end=first.end,
-        disruptions=list(first.disruptions),
-        requests=list(first.requests),
-    )
+def _begin(deployment: Deployment, run: RunRecord) -> Checkpoint:
+    """Return what is known of a run at its start."""
+    begun = 0 if run.start is None else run.start.origin.tick
+    control = Control(run.pace, False, 0, run.ticks and begun + run.ticks, [], {}, {})
+    account = Account(dict.fromkeys(sorted(deployment.nodes), 0))
+    chain = first_chain(None if run.start is None else run.start.origin)
+    return Checkpoint(run, deployment.owners(), control, account, chain)
 
 
-def _apply(history: History, record: Change) -> None:
+def _apply(kept: Checkpoint, record: Change) -> None:
     """Take one more record into a history."""
     if isinstance(record, CommitRecord):
-        _commit(history, record)
+        _commit(kept, record)
     elif isinstance(record, Epoch):
         owners = dict(record.owners)
-        before = dict(history.owners if history.epoch is None else history.epoch.owners)
-        history.account.moves += sum(before[robot] != owner for robot, owner in owners.items())
-        history.epoch, history.owners = record, owners
+        before = dict(decode(Epoch, kept.epoch).owners) if kept.epoch else kept.owners
+        kept.account.moves += sum(before[robot] != owner for robot, owner in owners.items())
+        kept.epoch, kept.owners = encode(record), owners
     elif isinstance(record, RequestRecord):
-        history.answers.keep(record.answer)
-        history.requests = [*history.requests, summary_of(record.verb, record.answer)][-REQUESTS_KEPT:]
-        history.control, history.owners = record.control, record.owners
-        _order(history, record)
+        kept.answers = [*kept.answers, record.answer][-ANSWERS_KEPT:]
+        kept.requests = [*kept.requests, summary_of(record.verb, record.answer)][-REQUESTS_KEPT:]
+        kept.control, kept.owners = record.control, record.owners
+        _order(kept, record)
     elif isinstance(record, OrderedRecord):
-        _order(history, record)
+        _order(kept, record)
     elif isinstance(record, RecoveredRecord):
-        history.recovered.append(record.entry)
+        kept.recovered.append(record.entry)
     elif isinstance(record, Control):
-        history.control = record
+        kept.control = record
     else:
-        history.end = record
+        kept.end = record
 
 
-def _order(history: History, record: RequestRecord | OrderedRecord) -> None:
+def _order(kept: Checkpoint, record: RequestRecord | OrderedRecord) -> None:
     if record.edits:
-        history.edits.setdefault(record.tick, []).extend(record.edits)
-        history.disruptions = [*history.disruptions, *disruptions_of(record.tick, record.edits)][-DISRUPTIONS_KEPT:]
+        kept.edits.setdefault(record.tick, []).extend(record.edits)
+        kept.disruptions = [*kept.disruptions, *disruptions_of(record.tick, record.edits)][-DISRUPTIONS_KEPT:]
 
 
-def _commit(history: History, record: CommitRecord) -> None:
+def _commit(kept: Checkpoint, record: CommitRecord) -> None:
     commit = decode(Commit, record.commit)
-    history.commits[commit.tick] = record.commit
-    history.commits.pop(commit.tick - limits.KEPT_TICKS, None)
-    history.edits.pop(commit.tick - 1, None)
-    start = history.run.start
+    kept.commits = [*kept.commits, record.commit][-limits.KEPT_TICKS :]
+    kept.edits.pop(commit.tick - 1, None)
+    start = kept.run.start
     if commit.tick == (0 if start is None else start.origin.tick):
-        history.started_ns = history.committed_ns = record.now_ns
+        kept.started_ns = kept.committed_ns = record.now_ns
         return
-    history.chain = chain_next(history.chain, commit.digest)
-    history.account.count(record.solved, record.solvers)
+    kept.chain = chain_next(kept.chain, commit.digest)
+    kept.account.count(record.solved, record.solvers)
     if record.lag_ns >= 0:
-        history.lags.add(record.lag_ns)
-    over = close_outages(history.recovered, history.committed_ns, record.now_ns)
+        kept.lags.add(record.lag_ns)
+    over = close_outages(kept.recovered, kept.committed_ns, record.now_ns)
     for entry, committed in zip(over, commit.recovered, strict=False):
         entry.outage_ns = committed.outage_ns  # the vHub's is longer than that between two commits
-    history.committed_ns = record.now_ns
+    kept.committed_ns = record.now_ns

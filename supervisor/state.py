@@ -44,7 +44,7 @@ from foosim.supervisor.settings import RunSettings
 from foosim.world.assembly.initial_state import first_chain, first_frame
 from foosim.world.components.view import ComponentError
 from foosim.world.edits import Edit, written
-from foosim.world.frame import Frame, frame_from_bytes
+from foosim.world.frame import Frame
 from foosim.world.setting.scheduled import Schedule
 
 
@@ -322,17 +322,17 @@ class RunState:
 
     def checkpoint(self) -> bytes:
         """Return the record with which a journal file starts, so that the files before it can go."""
-        orders = {tick: self.orders[tick] for tick in range(self.frame.tick, self.released)}
+        orders = {tick: self.orders[tick] for tick in range(self.frame.tick, self.released)} | self.coming_edits
         checkpoint = Checkpoint(
             self.run_record,
-            self.epoch_payload,
-            list(self.commits.values()),
-            self.chain,
-            sorted((tick, edits) for tick, edits in {**orders, **self.coming_edits}.items() if edits),
-            list(self.answers.values()),
             self.owners,
             self.control(),
             self.account,
+            self.chain,
+            self.epoch_payload,
+            list(self.commits.values()),
+            {tick: edits for tick, edits in sorted(orders.items()) if edits},
+            list(self.answers.values()),
             self.pacer.lags,
             self.recovered,
             self.started_ns,
@@ -345,28 +345,29 @@ class RunState:
 
     def restore(self, history: History) -> None:
         """Restore the state at the end of a journal, before an epoch."""
-        self.frame, self.chain = history.frame, history.chain
+        kept, self.frame = history
+        self.chain, self.end, self.account = kept.chain, kept.end, kept.account
         self.released = self.frame.tick
         self.inputs.reset(self.frame.tick)
-        self.commits = dict(history.commits)
-        if history.epoch is not None:
-            self.epoch, self.owners = history.epoch.epoch, dict(history.epoch.owners)
-            self.epoch_payload = encode(history.epoch)
-        self.stop_at, self.end, self.account = history.control.stop_at, history.end, history.account
-        self.started_ns, self.committed_ns = history.started_ns, history.committed_ns
-        control, pacer = history.control, self.pacer
+        self.commits = {decode(Commit, commit).tick: commit for commit in kept.commits}
+        if kept.epoch:
+            epoch = decode(Epoch, kept.epoch)
+            self.epoch, self.owners, self.epoch_payload = epoch.epoch, dict(epoch.owners), kept.epoch
+        self.started_ns, self.committed_ns = kept.started_ns, kept.committed_ns
+        control, pacer = kept.control, self.pacer
+        self.stop_at, self.returns = control.stop_at, dict(control.returns)
         pacer.pace, pacer.paused, pacer.granted = parse_pace(control.pace), control.paused, control.granted
-        pacer.lags = history.lags
+        pacer.lags = kept.lags
         self.roster.stopped, self.roster.starts = set(control.stopped), dict(control.starts)
-        self.recovered, self.returns = history.recovered, dict(control.returns)
-        self.restore_requests(history)
-        self.last_requests.extend(history.requests)
+        self.recovered = kept.recovered
+        self.restore_requests(kept)
+        self.last_requests.extend(kept.requests)
 
-    def restore_requests(self, history: History) -> None:
+    def restore_requests(self, kept: Checkpoint) -> None:
         """Restore the effects of requests, and the last answers."""
-        self.coming_edits, self.disruptions = history.edits, history.control.disruptions
-        self.last_disruptions.extend(history.disruptions)
-        self.answers = history.answers
+        self.coming_edits, self.disruptions = kept.edits, kept.control.disruptions
+        self.last_disruptions.extend(kept.disruptions)
+        self.answers = KeptAnswers(ANSWERS_KEPT, kept.answers)
 
     def catch_up(self, frame: Frame, chain: bytes, commit: bytes) -> None:
         """Put the state at a committed frame after the last one in the journal, which begins anew with it."""
@@ -376,11 +377,3 @@ class RunState:
         self.coming_edits = {tick: edits for tick, edits in self.coming_edits.items() if tick >= frame.tick}
         self.commits = {frame.tick: commit}
         self.actions.append(Journal(self.checkpoint()))
-
-    def frame_of(self, standing: ResumeState) -> Frame:
-        """Return the vHub's last committed frame. Raises Malformed for a commit that does not fit its frame."""
-        commit = decode(Commit, standing.commit)
-        frame = frame_from_bytes(commit.tick, self.frame.layout, commit.values, commit.outboxes)
-        if frame.digest != commit.digest:
-            raise Malformed(f"commit {commit.tick} of the vHub has another digest than its frame")
-        return frame

@@ -220,6 +220,8 @@ NO_DEADLINES = {
     "OBSERVED_EVERY_S",
     "STARVED_S",
     "WARNED_EVERY_S",
+    "REMINDER_NS",
+    "SILENT_NS",
 }
 """How often something is done or said again, and what is no wait for another process."""
 

@@ -16,7 +16,7 @@ import pytest
 ROOT: Final = Path(__file__).parents[1]
 PACKAGES: Final = (
     *("analysis", "capture", "cli", "client", "common", "console", "deployment", "launcher", "node", "painting"),
-    *("process", "protocol", "runtime", "simulation", "supervisor", "vhub"),
+    *("protocol", "runtime", "simulation", "supervisor", "vhub"),
 )
 ENDINGS: Final = {".py", ".js", ".ts", ".mjs", ".html", ".css"}
 BUNDLES: Final = ("console", "www")

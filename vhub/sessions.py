@@ -34,7 +34,7 @@ from foosim.protocol.messages import (
     Join,
     Sent,
 )
-from foosim.runtime.closed import CLOSED, closed
+from foosim.runtime.roles.standstill import CLOSED, closed
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.members import may_lockstep, may_restart

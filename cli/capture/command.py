@@ -167,7 +167,7 @@ def _verdict(found: Verified) -> str:
 def recover(
     capture: Capture,
     journals: Annotated[
-        Path | None, typer.Option(help="The folder with its vHub's journal, e.g. RUN/journals.", show_default=False)
+        Path | None, typer.Option(help="The folder with its vHub's journal, e.g. RUN/journals.")
     ] = None,
     out: Annotated[
         Path | None,

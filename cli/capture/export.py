@@ -25,9 +25,7 @@ _TABLES = ", ".join(table_names())
 
 def export(
     capture: Capture,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="The file to write; - is standard output.", show_default=False)
-    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The file to write; - is standard output.")],
     what: Annotated[str, typer.Option(help=f"The table: {_TABLES}.")] = "packets",
     form: Annotated[
         str | None, typer.Option("--format", help="csv or parquet; by default from the file's suffix, csv for -.")
@@ -62,7 +60,7 @@ def _format(text: str | None) -> Format | None:
 
 def cut(
     capture: Capture,
-    out: Annotated[Path, typer.Option("--out", "-o", help="The capture to write.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The capture to write.")],
     begin: Annotated[str | None, typer.Option("--from", help="Time at which it begins, e.g. 10s.")] = None,
     end: Annotated[str | None, typer.Option("--to", help="Time at which it ends, e.g. 20s.")] = None,
     json: JsonOption = False,
@@ -86,11 +84,10 @@ def cut(
 
 
 def diff(
-    one: Annotated[Path, typer.Argument(metavar="A", help="A capture.", show_default=False)],
-    other: Annotated[Path, typer.Argument(metavar="B", help="Another one.", show_default=False)],
+    one: Annotated[Path, typer.Argument(metavar="A", help="A capture.")],
+    other: Annotated[Path, typer.Argument(metavar="B", help="Another one.")],
     ignore: Annotated[
-        list[str] | None,
-        typer.Option(help="Do not compare this field (digest) or channel (/epochs); may be repeated."),
+        list[str] | None, typer.Option(help="Do not compare this field (digest) or channel (/epochs); may be repeated.")
     ] = None,
     json: JsonOption = False,
 ) -> None:

@@ -29,7 +29,7 @@ def reading() -> Iterator[None]:
         raise BadCapture(str(error)) from None
 
 
-Capture = Annotated[Path, typer.Argument(metavar="CAPTURE", help="The capture, an MCAP file.", show_default=False)]
+Capture = Annotated[Path, typer.Argument(metavar="CAPTURE", help="The capture, an MCAP file.")]
 
 
 def time_of(option: str, text: str | None) -> int | None:

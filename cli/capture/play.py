@@ -94,7 +94,7 @@ def _played_text(result: PlayResult) -> str:
 
 
 def control(
-    request: Annotated[str, typer.Argument(help=f"One of {', '.join(ARGUMENTS)}.", show_default=False)],
+    request: Annotated[str, typer.Argument(help=f"One of {', '.join(ARGUMENTS)}.")],
     value: Annotated[
         str | None, typer.Argument(help="A number of ticks (step), a time (seek) or a rate (rate).")
     ] = None,

@@ -17,7 +17,7 @@ from foosim.runtime.command import JsonOption, print_json
 
 def report(
     capture: Capture,
-    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write, NAME.html.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write, NAME.html.")],
     json: JsonOption = False,
 ) -> None:
     """Write an HTML report about the network of a captured run.

@@ -29,8 +29,7 @@ LINKS_SHOWN = 40
 def what_if(
     capture: Capture,
     network: Annotated[
-        Path | None,
-        typer.Option(help="A deployment, or a file with its `network:` section alone.", show_default=False),
+        Path | None, typer.Option(help="A deployment, or a file with its `network:` section alone.")
     ] = None,
     settings: Annotated[
         list[str] | None,
@@ -39,9 +38,7 @@ def what_if(
         ),
     ] = None,
     packets: Annotated[bool, typer.Option("--packets", help="List each packet that changed.")] = False,
-    drawing: Annotated[
-        Path | None, typer.Option("--picture", help=HELP.format("the changes per link"), show_default=False)
-    ] = None,
+    drawing: Annotated[Path | None, typer.Option("--picture", help=HELP.format("the changes per link"))] = None,
     json: JsonOption = False,
 ) -> None:
     """Send a capture's packets through another network.

@@ -15,7 +15,7 @@ from typing import Final
 
 from foosim.protocol.channels import CHANNELS, Channel, Plane
 from foosim.runtime import GC_THRESHOLDS
-from foosim.runtime.progress import EVERY_NS, ProgressFile
+from foosim.runtime.health import EVERY_NS, ProgressFile
 from foosim.runtime.roles.bus import Bus
 from foosim.runtime.roles.role import Letter, Role
 from foosim.runtime.roles.standstill import Standstill

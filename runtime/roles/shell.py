@@ -22,10 +22,9 @@ from foosim.runtime.roles.wire import Wire
 from foosim.runtime.run_folder import open_run
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
 from foosim.runtime.systemd import Notify
-from foosim.runtime.transport.admission import Admission
+from foosim.runtime.transport.admission import Admission, Exposure
 from foosim.runtime.transport.certificates import Credentials, load_credentials, warn_of_end
 from foosim.runtime.transport.inbox import Inbox
-from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import ConnectError, Session, use_client_runtime
 from foosim.runtime.transport.settings import Security
 

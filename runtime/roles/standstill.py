@@ -36,3 +36,16 @@ def standstill_text(stood_ns: int) -> str:
     return (
         f"event loop was blocked for {stood_ns / 1e9:.1f} s; peer deadlines extended" if stood_ns >= REPORTED_NS else ""
     )
+
+
+CLOSED: Final = "its connection closed"
+SILENT_NS: Final = 750_000_000
+"""The shortest silence before a lease expires: the lease, less the quarter of it between two messages of a session."""
+
+
+def closed(silent_ns: int, what: str = "nothing was heard of it") -> str:
+    """Return the reason of a loss by a closed connection, after a silence of so long.
+
+    A process that ends closes its connection; one that is stopped, or cut off, is silent until its lease expires.
+    """
+    return CLOSED if silent_ns < SILENT_NS else f"{CLOSED}: {what} for {silent_ns / 1e9:.1f} s"

@@ -29,9 +29,9 @@ from foosim.protocol.channels import PLAYED, REPLAY, VHUB, Plane
 from foosim.protocol.codec import encode
 from foosim.protocol.replay_messages import CLOCK, STREAMS
 from foosim.runtime.roles.wire import Wire
+from foosim.runtime.transport.admission import Exposure
 from foosim.runtime.transport.certificates import check_host, load_credentials
 from foosim.runtime.transport.inbox import Inbox
-from foosim.runtime.transport.open_plane_warning import Exposure
 from foosim.runtime.transport.session import Session
 from foosim.runtime.transport.settings import Security
 from foosim.simulation.play.address_file import noted

@@ -146,16 +146,6 @@ def test_bad_input_is_refused_without_a_traceback(command: Command, arguments: t
     assert done.code in (1, 2, 3) and done.err and "Traceback" not in done.err
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [("top",), ("heal",), ("set", "lan", "loss=5%"), ("partition", "a", "b"), ("clog", "a", "b")],
-    ids=" ".join,
-)  # fmt: skip
-def test_without_a_run_it_says_so(command: Command, arguments: tuple[str, ...]) -> None:
-    done = command(*arguments)
-    assert (done.code, done.err) == (1, "no run is live; foosim up FILE starts one\n")
-
-
 def test_settings_are_nested() -> None:
     assert nested(["loss=5%", "burst.loss=1 %", "burst.mean_bad=20ms", "allow=false"]) == {
         "loss": "5%",

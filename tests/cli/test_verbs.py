@@ -13,16 +13,12 @@ import typer
 from foosim.cli import main
 from foosim.cli.role import RoleVerbs
 from foosim.cli.verbs import Foosim
-from foosim.common.errors import Refused
 from foosim.deployment.loader import load_deployment
-from foosim.deployment.schema import Capture
 from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher import pki as certificates
 from foosim.launcher import plan
-from foosim.launcher.plan import check_rooms
 from foosim.protocol.identity import identities_of
-from foosim.runtime.disk import free_bytes
-from foosim.runtime.help_text import summary_of
+from foosim.runtime.command import summary_of
 from foosim.runtime.run_folder import runs_folder
 from tests.apart import apart
 from tests.conftest import Command, Typed
@@ -241,21 +237,13 @@ def test_too_few_file_descriptors_are_refused_before_anything_starts(
     assert (done.code, done.err) == (3, what) and not runs_folder().exists()
 
 
-def test_a_disk_with_little_more_than_the_reserve_is_warned_of(tmp_path: Path) -> None:
-    at = tmp_path / "captures" / "run.mcap"
-    tight = Capture.model_construct(reserve_bytes=int(0.7 * free_bytes(tmp_path)), on_full="stop_world")
-    full = Capture.model_construct(reserve_bytes=3 * free_bytes(tmp_path), on_full="continue_unlogged")
-    assert check_rooms(Capture.model_construct(reserve_bytes=1 << 16, on_full="stop_world"), at, tmp_path) == []
-    told = check_rooms(tight, at, tmp_path / "runs")
-    assert [text.partition(": ")[0] for text in told] == ["room gets little, at the reserve the run ends"] * 2
-    assert len(check_rooms(tight, None, tmp_path / "runs")) == 1
-    with pytest.raises(Refused, match=f"^{tmp_path}/runs: "):
-        check_rooms(full, at, tmp_path / "runs")
-
-
 @pytest.mark.parametrize(
     "arguments",
-    [("status",), ("pause",), ("step", "3"), ("push", "0", "0", "1"), ("move", "red.goal", "blue"), ("down",)],
+    [
+        *(("status",), ("pause",), ("step", "3"), ("push", "0", "0", "1"), ("move", "red.goal", "blue"), ("down",)),
+        *(("net", "top"), ("net", "heal"), ("net", "set", "lan", "loss=5%"), ("net", "partition", "a", "b")),
+        ("net", "clog", "a", "b"),
+    ],
 )
 def test_without_a_live_run_there_is_nobody_to_control(command: Command, arguments: tuple[str, ...]) -> None:
     assert command(*arguments) == (1, "", "no run is live; foosim up FILE starts one\n")
@@ -264,10 +252,7 @@ def test_without_a_live_run_there_is_nobody_to_control(command: Command, argumen
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (
-            ("rate", "quick"),
-            "foosim rate PACE: not a pace (realtime, fast or a factor such as 2x), 'quick'",
-        ),
+        (("rate", "quick"), "foosim rate PACE: not a pace (realtime, fast or a factor such as 2x), 'quick'"),
         (("rate", "0x"), "foosim rate PACE: out of range 0.001x to 1000x, '0x'"),
         (("rate", "-1x"), "foosim rate PACE: out of range 0.001x to 1000x, '-1x'"),
         (

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from foosim.protocol.channels import SUPERVISOR, VHUB
-from foosim.runtime.children import script
+from foosim.runtime.process import script
 from tests.faults.cluster import LIMIT_S, Cluster, FaultError
 from tests.wire.proxy import BOTH, Direction
 

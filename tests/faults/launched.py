@@ -17,7 +17,7 @@ from typing import Final
 
 from foosim.client import control
 from foosim.common.errors import Refused
-from foosim.runtime.children import script
+from foosim.runtime.process import script
 from foosim.simulation.run import rehearse
 from tests.faults.cluster import LIMIT_S, POLL_S, TABLE, FaultError
 from tests.faults.kinds import CALM_S, Figures

@@ -77,48 +77,28 @@ def test_the_classes_of_players_are_imported_where_they_are_to_run(tmp_path: Pat
     assert "there is no module own_team" in finding.text and "as ssh to arm has it" in finding.remedy
 
 
-def _no_certificate(folder: Path) -> None:
-    (folder / "node.red.pem").unlink()
-
-
-def _short(folder: Path) -> None:
-    for suffix in (".pem", ".key"):
-        (folder / f"node.red{suffix}").unlink()
-    certificates.issue(folder, ["node.red"], days=3)
-
-
-def _swapped(folder: Path) -> None:
-    (folder / "node.red.key").write_bytes((folder / "node.blue.key").read_bytes())
-
-
-def _readable(folder: Path) -> None:
-    (folder / "node.red.key").chmod(0o644)
-
-
-def _no_root(folder: Path) -> None:
-    (folder / "ca.pem").unlink()
+def short(pem: Path) -> None:
+    """Issue a certificate for three days."""
+    for path in (pem, pem.with_suffix(".key")):
+        path.unlink()
+    certificates.issue(pem.parent, ["node.red"], days=3)
 
 
 @pytest.mark.parametrize(
     ("spoil", "subject", "state", "said", "remedy"),
     [
-        (_no_certificate, "node.red", "problem", "no certificate", "foosim pki init"),
-        (_short, "node.red", "warning", "renew it", "foosim pki init"),
-        (_swapped, "node.red", "problem", "does not belong to", "remove both files"),
-        (_readable, "node.red.key", "problem", "can be read by others", "chmod 600"),
-        (_no_root, "ca.pem", "problem", "has no ca.pem", "foosim pki init"),
+        (lambda pem: pem.unlink(), "node.red", "problem", "no certificate", "foosim pki init"),
+        (lambda pem: pem.with_suffix(".key").write_bytes(b""), "node.red", "problem", "not a", "remove both files"),
+        (lambda pem: pem.with_suffix(".key").chmod(0o644), "node.red.key", "problem", "can be read by", "chmod 600"),
+        (lambda pem: pem.with_name("ca.pem").unlink(), "ca.pem", "problem", "has no ca.pem", "foosim pki init"),
+        (short, "node.red", "warning", "renew it", "foosim pki init"),
     ],
 )
 def test_what_is_wrong_with_certificates_is_found(
-    deployment: Deployment,
-    folder: Path,
-    spoil: Callable[[Path], None],
-    subject: str,
-    state: str,
-    said: str,
+    deployment: Deployment, folder: Path, spoil: Callable[[Path], object], subject: str, state: str, said: str,
     remedy: str,
-) -> None:
-    spoil(folder)
+) -> None:  # fmt: skip
+    spoil(folder / "node.red.pem")
     finding = found(Case(deployment, "127.0.0.1", pki=folder), subject)
     assert finding.state == state and said in finding.text and remedy in finding.remedy
 

@@ -9,12 +9,9 @@ from typing import Any, Final
 import pytest
 
 from foosim.launcher import processes
-from foosim.launcher import processes as endings
 from foosim.launcher.processes import Child, Ending, OomKills, oom_kills
 
 REFUSED: Final = "2026-03-01T12:00:00.000Z ERROR   red: refused by the supervisor: a node red is already here"
-
-
 ERROR = "2026-11-23T18:22:43.352Z ERROR   supervisor: the run does not go on"
 WARNING = "2026-11-23T18:22:43.354Z WARNING vhub: leaves its capture run.mcap unfinished"
 """Of two roles of one process, the one that was refused and one that leaves with it."""
@@ -30,10 +27,7 @@ WARNING = "2026-11-23T18:22:43.354Z WARNING vhub: leaves its capture run.mcap un
             "was killed by SIGKILL, not by foosim; "
             "too little memory: the kernel has killed for that on this machine while it ran",
         ),
-        (
-            Ending(-6, ["memory allocation of 4096 bytes failed"]),
-            "was killed by SIGABRT: too little memory",
-        ),
+        (Ending(-6, ["memory allocation of 4096 bytes failed"]), "was killed by SIGABRT: too little memory"),
         (Ending(-11, ["anything"]), "was killed by SIGSEGV, not by foosim"),
         (Ending(1, ["  File ...", "MemoryError"]), "ended with exit code 1: too little memory"),
         (Ending(1, ["RuntimeError: can't start new thread"]), "ended with exit code 1: too little memory"),
@@ -64,7 +58,7 @@ def test_the_kernel_says_where_it_has_killed(tmp_path: Path, monkeypatch: pytest
     (tmp_path / "group").write_text("4:memory:/other\n0::/user/run\n")
     (group / "memory.events").write_text("low 0\noom 9\noom_kill 2\n")
     for name, place in (("_VMSTAT", "vmstat"), ("_OWN_GROUP", "group"), ("_GROUPS", "")):
-        monkeypatch.setattr(endings, name, tmp_path / place)
+        monkeypatch.setattr(processes, name, tmp_path / place)
     begun = oom_kills()
     assert begun == OomKills(2, 3) and oom_kills().since(begun) == ""
     (tmp_path / "vmstat").write_text("oom_kill 4\n")
@@ -84,16 +78,6 @@ def test_what_is_killed_on_a_machine_after_its_end_is_not_held_against_a_process
     counts = [OomKills(0, 5), OomKills(0, 6)]
     monkeypatch.setattr(processes, "oom_kills", lambda: counts.pop(0))
     ended: Any = SimpleNamespace(poll=lambda: -9)
-    child = Child(
-        "red",
-        (
-            "foosim",
-            "role",
-            "node",
-        ),
-        tmp_path / "log",
-        ended,
-        oom_kills=OomKills(0, 5),
-    )
+    child = Child("red", ("foosim", "role", "node"), tmp_path / "log", ended, oom_kills=OomKills(0, 5))
     for _ in range(2):
         assert child.ending == "was killed by SIGKILL, not by foosim"

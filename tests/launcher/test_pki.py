@@ -3,7 +3,6 @@
 import json
 import os
 import stat
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 from typing import Final
@@ -21,12 +20,7 @@ from foosim.launcher import pki
 from foosim.runtime.transport import certificates
 from foosim.runtime.transport.certificate_files import hosts_of, read_certificate
 from foosim.runtime.transport.certificate_folder import CertificateError
-from foosim.runtime.transport.certificates import (
-    check_host,
-    load_credentials,
-    operator_credentials,
-    viewer_credentials,
-)
+from foosim.runtime.transport.certificates import check_host, load_credentials, operator_credentials, viewer_credentials
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -81,8 +75,7 @@ def test_renewed_is_the_same_but_for_the_dates(folder: Path, monkeypatch: pytest
     everybody = ["supervisor", "node.red"]
     pki.issue(folder, everybody, ["10.0.0.7"], days=10)
     old, key = read_certificate(folder / "node.red.pem"), (folder / "node.red.key").read_bytes()
-    now = wall_clock.now_utc()
-    monkeypatch.setattr(wall_clock, "now_utc", lambda: now + timedelta(days=4))
+    in_days(4, monkeypatch)
     assert pki.provide(folder, everybody, within_days=3) == []
     made = pki.provide(folder, ["node.red"], within_days=7)
     assert made == [folder / "node.red.pem"]
@@ -108,81 +101,45 @@ def test_a_certificate_of_another_root_is_issued_anew_and_one_of_somebody_else_i
     assert (folder / "node.blue.pem").read_bytes() == before
 
 
-def _expired(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = wall_clock.now_utc()
-    monkeypatch.setattr(wall_clock, "now_utc", lambda: now + timedelta(days=91))
+def in_days(days: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let it be so many days later."""
+    then = wall_clock.now_utc() + timedelta(days=days)
+    monkeypatch.setattr(wall_clock, "now_utc", lambda: then)
 
 
-def _early(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = wall_clock.now_utc()
-    monkeypatch.setattr(wall_clock, "now_utc", lambda: now - timedelta(hours=2))
-
-
-def _root_expired(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = wall_clock.now_utc()
-    monkeypatch.setattr(wall_clock, "now_utc", lambda: now + timedelta(days=3700))
-
-
-def _others_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "node.red.key").write_bytes((folder / "node.blue.key").read_bytes())
-
-
-def _others_certificate(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for suffix in (".pem", ".key"):
-        (folder / f"node.red{suffix}").write_bytes((folder / f"node.blue{suffix}").read_bytes())
-
-
-def _others_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    other = folder.parent / "other"
-    (other / pki.init(other).name).replace(folder / "ca.pem")
-
-
-def _leaf_for_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "ca.pem").write_bytes((folder / "node.blue.pem").read_bytes())
-
-
-def _garbage(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "node.red.pem").write_bytes(b"-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n")
-
-
-def _garbage_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "node.red.key").write_bytes(b"\0\1\2")
-
-
-def _no_key(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "node.red.key").unlink()
-
-
-def _nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "node.red.pem").unlink()
-
-
-def _no_root(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "ca.pem").unlink()
-
-
-@pytest.mark.parametrize(
-    ("spoil", "said"),
-    [
-        (_expired, r"node\.red\.pem: expired on .* UTC; foosim pki init .* FILE"),
-        (_early, r"ca\.pem: valid from .* mind the clock"),
-        (_root_expired, r"ca\.pem: expired on"),
-        (_others_key, r"node\.red\.key: the key does not belong to the certificate node\.red\.pem"),
-        (_others_certificate, r"node\.red\.pem: a certificate of 'node\.blue', not of node\.red"),
-        (_others_root, r"node\.red\.pem: not issued by the root in ca\.pem beside it"),
-        (_leaf_for_root, r"ca\.pem: not the certificate of an authority"),
-        (_garbage, r"node\.red\.pem: not a certificate in PEM"),
-        (_garbage_key, r"node\.red\.key: not a private key in PEM"),
-        (_no_key, r"node\.red\.key: cannot be read, No such file"),
-        (_nothing, r"has no certificate of node\.red; it has: node\.blue"),
-        (_no_root, r"has no ca\.pem; foosim pki init"),
-    ],
+GARBAGE: Final = b"-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n"
+SPOILED: Final[tuple[tuple[dict[str, str | bytes | None], float, str], ...]] = (
+    ({}, 91, r"node\.red\.pem: expired on .* UTC; foosim pki init .* FILE"),
+    ({}, -2 / 24, r"ca\.pem: valid from .* mind the clock"),
+    ({}, 3700, r"ca\.pem: expired on"),
+    ({"node.red.key": "node.blue.key"}, 0, r"node\.red\.key: the key does not belong to the certificate node"),
+    (
+        {"node.red.pem": "node.blue.pem", "node.red.key": "node.blue.key"},
+        *(0, r"node\.red\.pem: a certificate of 'node\.blue', not of node\.red"),
+    ),
+    ({"ca.pem": "../other/ca.pem"}, 0, r"node\.red\.pem: not issued by the root in ca\.pem beside it"),
+    ({"ca.pem": "node.blue.pem"}, 0, r"ca\.pem: not the certificate of an authority"),
+    ({"node.red.pem": GARBAGE}, 0, r"node\.red\.pem: not a certificate in PEM"),
+    ({"node.red.key": b"\0\1\2"}, 0, r"node\.red\.key: not a private key in PEM"),
+    ({"node.red.key": None}, 0, r"node\.red\.key: cannot be read, No such file"),
+    ({"node.red.pem": None}, 0, r"has no certificate of node\.red; it has: node\.blue"),
+    ({"ca.pem": None}, 0, r"has no ca\.pem; foosim pki init"),
 )
+"""What replaces which files, the days that pass, and what is said."""
+
+
+@pytest.mark.parametrize(("files", "days", "said"), SPOILED)
 def test_what_would_be_refused_is_refused_before_anything_is_opened(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, spoil: Callable[[Path, pytest.MonkeyPatch], None], said: str
+    folder: Path, monkeypatch: pytest.MonkeyPatch, files: dict[str, str | bytes | None], days: float, said: str
 ) -> None:
     pki.issue(folder, ["node.red", "node.blue"])
-    spoil(folder, monkeypatch)
+    pki.init(folder.parent / "other")
+    for name, content in files.items():
+        if content is None:
+            (folder / name).unlink()
+        else:
+            (folder / name).write_bytes(content if isinstance(content, bytes) else (folder / content).read_bytes())
+    in_days(days, monkeypatch)
     with pytest.raises(CertificateError, match=said) as refused:
         load_credentials(folder, "node.red")
     assert refused.value.exit_code == 3

@@ -9,19 +9,17 @@ from typing import Any
 
 import pytest
 
-from foosim.cli import main
+from foosim.cli import main, run
 from foosim.common import wall_clock
-from foosim.common.addresses import Address, Insecure
-from foosim.common.errors import BadValue, Refused
+from foosim.common.addresses import Address
+from foosim.common.errors import Refused
 from foosim.launcher.begin import begin
 from foosim.launcher.display import Display
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import Up
 from foosim.library.table.settings import table_of
-from foosim.runtime.run_folder import RunFolder
-from foosim.supervisor import main as supervisor_main
-from foosim.supervisor.settings import RunSettings
+from foosim.protocol.channels import SUPERVISOR
 
 TABLE = Path(__file__).parent.parent.parent / "deploy" / "table.yaml"
 EVERYTHING = RunOptions(
@@ -55,13 +53,6 @@ def test_a_time_that_ends_within_a_tick_lasts_to_its_end() -> None:
     assert make_plan(RunOptions(TABLE, duration="2001 us")).ticks == 2
 
 
-def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(Insecure):
-        make_plan(RunOptions(TABLE, listen="0.0.0.0"))
-    with pytest.raises(BadValue):
-        make_plan(RunOptions(TABLE, duration="0 s"))
-
-
 @pytest.mark.parametrize("options", [RunOptions(TABLE), EVERYTHING], ids=["bare", "everything"])
 def test_the_supervisors_process_makes_the_same_plan(
     options: RunOptions, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
@@ -70,18 +61,17 @@ def test_the_supervisors_process_makes_the_same_plan(
     monkeypatch.setattr(sys, "argv", ["foosim", "run", *options.arguments(), "--run", "mine"])
     served: list[Any] = []
 
-    def serve(settings: RunSettings, address: Address, pki: Path | None, folder: RunFolder, *others: Any) -> int:
-        served.extend((settings, address, pki, folder.name))
+    def serve(*given: object, **more: object) -> int:
+        served.extend((*given, more))
         return 0
 
-    monkeypatch.setattr(supervisor_main, "serve", serve)
+    monkeypatch.setattr(run, "run_roles", serve)
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 0
-    settings, address, pki, name = served
-    plan = make_plan(options)
-    assert name == "mine" and settings == plan.settings("mine") and address == plan.address
-    assert pki == (None if plan.options.pki is None else plan.options.pki.absolute())
+    name, (plan, folder), more = served
+    assert (name, folder.name, plan) == (SUPERVISOR, "mine", make_plan(options))
+    assert more == {"pki": None, "progress": None}
 
 
 def test_ports_that_are_taken_and_paths_that_are_no_text_are_refused_before_anything_is_made(

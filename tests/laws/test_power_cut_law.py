@@ -95,7 +95,7 @@ class Cut:
         assert self.system.hub.finished and channels.VHUB not in self.system.processes, "the capture is closed"
         result = self.system.supervisor.result()
         assert result["reason"] == end.reason and result["failed"] and result["ticks"] == self.state.frame.tick
-        assert fold(self.state.deployment, self.system.journal).end == end
+        assert fold(self.state.deployment, self.system.journal).kept.end == end
         return match
 
 
@@ -153,7 +153,7 @@ def test_a_supervisor_that_was_started_again_ends_it_too(hub: int, supervisor: i
         return
     state = cut.state
     assert state.end is None and re.fullmatch(f"{KNOWN}|{UNKNOWN}", state.abandoned)
-    assert fold(state.deployment, cut.system.journal).end is None and not cut.system.hub.finished
+    assert fold(state.deployment, cut.system.journal).kept.end is None and not cut.system.hub.finished
 
 
 def test_a_supervisor_that_alone_has_lost_its_machine_goes_on_from_the_vhubs_commit() -> None:

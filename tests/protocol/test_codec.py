@@ -23,9 +23,8 @@ from foosim.common.json_text import decode_json, encode_json
 from foosim.protocol import codec
 from foosim.protocol.channels import CHANNELS, Channel
 from foosim.protocol.codec import decode, decode_any, encode
-from foosim.protocol.messages import Commit, Deliveries, Done, End, Epoch, Hello, Order, Part, Request, Sent, Up, Want
+from foosim.protocol.messages import Commit, Hello, Order, Part, Want
 from foosim.world.edits import Add, Edit, Push, Remove, Set
-from foosim.world.robot_packets import Delivered
 
 LONG: Final = 5
 """How long lists, texts and bytes of an example are at most; limits have tests of their own."""
@@ -194,79 +193,56 @@ def _least(kind: Any) -> Any:
 
 def _least_value(kind: inspect.Type) -> object:
     if isinstance(kind, inspect.UnionType):
-        return None  # where a field may be left out
+        return None if kind.includes_none else _least_value(kind.types[0])  # None where a field may be left out
     if isinstance(kind, inspect.IntType):
         return kind.ge
     if isinstance(kind, inspect.StrType):
         return "x" * (kind.min_length or 0)
     if isinstance(kind, inspect.BytesType):
         return bytes(kind.min_length or 0)
+    if isinstance(kind, inspect.StructType):
+        return _least(kind.cls)
+    if isinstance(kind, inspect.TupleType):
+        return tuple(map(_least_value, kind.item_types))
     return {inspect.FloatType: 0.0, inspect.BoolType: False, inspect.ListType: []}[type(kind)]
 
 
-def delivered(payload: bytes) -> Delivered:
-    return Delivered(0, "s", 1, 0, "d", "c", payload)
+def lengths(kind: Any) -> Iterator[tuple[str, inspect.Type]]:
+    """(field, type) of every text, bytes and list of a message."""
+    for field in inspect.type_info(kind).fields:  # type: ignore[attr-defined]
+        if isinstance(field.type, inspect.StrType | inspect.BytesType | inspect.ListType):
+            yield field.name, field.type
 
 
-def sent(payload: bytes) -> Sent:
-    return Sent(1, "d", "c", 0, payload)
+def of_length(kind: Any, length: int) -> object:
+    """A text, bytes or a list of so many items."""
+    if isinstance(kind, inspect.ListType):
+        return [_least_value(kind.item_type)] * length
+    return "x" * length if isinstance(kind, inspect.StrType) else bytes(length)
 
 
-LONGEST = limits.NAME_LENGTH_MAX
-OVERSIZED: Final[dict[str, tuple[Any, Any, Any]]] = {
-    "a name": (Want, Want("n" * LONGEST, "k", 0, 0, []), Want("n" * (LONGEST + 1), "k", 0, 0, [])),
-    "an empty name": (Want, Want("n", "k", 0, 0, []), Want("", "k", 0, 0, [])),
-    "a digest": (Part, Part(1, 1, "n", bytes(32), [], b"", b"", []), Part(1, 1, "n", bytes(33), [], b"", b"", [])),
-    "a payload": (
-        Deliveries,
-        Deliveries(0, [delivered(bytes(limits.PAYLOAD_BYTES_MAX))]),
-        Deliveries(0, [delivered(bytes(limits.PAYLOAD_BYTES_MAX + 1))]),
-    ),
-    "packets": (
-        Up,
-        Up("c", "b", [sent(b"")] * limits.PACKETS_PER_MESSAGE_MAX),
-        Up("c", "b", [sent(b"")] * (limits.PACKETS_PER_MESSAGE_MAX + 1)),
-    ),
-    "packets of a Done": (Done, Done("c", "b", 0, []), Done("c", "b", 0, [sent(b"")] * 65_537)),
-    "solved": (
-        Part,
-        Part(1, 1, "n", bytes(32), list(range(limits.ENTITIES_MAX)), b"", b"", []),
-        Part(1, 1, "n", bytes(32), list(range(limits.ENTITIES_MAX + 1)), b"", b"", []),
-    ),
-    "edits": (
-        Order,
-        Order(1, 0, [Remove("b")] * limits.ENTITIES_MAX),
-        Order(1, 0, [Remove("b")] * (limits.ENTITIES_MAX + 1)),
-    ),
-    "owners": (
-        Epoch,
-        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * limits.ENTITIES_MAX, b""),
-        Epoch(1, 0, bytes(32), ["n"], [("r", "n")] * (limits.ENTITIES_MAX + 1), b""),
-    ),
-    "arithmetic": (
-        Epoch,
-        Epoch(1, 0, bytes(32), ["n"], [], bytes(32)),
-        Epoch(1, 0, bytes(32), ["n"], [], bytes(33)),
-    ),
-    "a text": (
-        End,
-        End(1, "r" * limits.TEXT_LENGTH_MAX, False),
-        End(1, "r" * (limits.TEXT_LENGTH_MAX + 1), False),
-    ),
-    "arguments": (
-        Request,
-        Request("o", "1", "v", bytes(limits.TEXT_LENGTH_MAX)),
-        Request("o", "1", "v", bytes(limits.TEXT_LENGTH_MAX + 1)),
-    ),
-}
+def parts_of(kind: Any) -> set[Any]:
+    """A type of message, and those of the items that it has."""
+    fields = [field.type for field in inspect.type_info(kind).fields]  # type: ignore[attr-defined]
+    items = [its.item_type for its in fields if isinstance(its, inspect.ListType)]
+    inner = [one for item in items for one in getattr(item, "types", [item]) if isinstance(one, inspect.StructType)]
+    return {kind}.union(*(parts_of(one.cls) for one in inner))
 
 
-@pytest.mark.parametrize("what", OVERSIZED)
-def test_what_is_longer_than_its_limit_is_refused(what: str) -> None:
-    kind, fits, too_long = OVERSIZED[what]
-    assert decode(kind, encode(fits)) == fits
-    with pytest.raises(Malformed):
-        decode(kind, encode(too_long))
+@pytest.mark.parametrize("kind", sorted({part for kind in kinds() for part in parts_of(kind)}, key=str))
+def test_what_is_longer_or_shorter_than_its_limits_is_refused(kind: Any) -> None:
+    message = _least(kind)
+    for name, its in lengths(kind):
+        assert its.max_length is not None, f"{kind.__name__}.{name} has no limit"  # type: ignore[attr-defined]
+        least, most = its.min_length or 0, its.max_length  # type: ignore[attr-defined]
+        for length, fits in ((least, True), (most, True), (least - 1, False), (most + 1, False)):
+            if 0 <= length <= 1 << 20:
+                payload = encode(msgspec.structs.replace(message, **{name: of_length(its, length)}))
+                if fits:
+                    assert decode_any(kind, payload) is not None
+                else:
+                    with pytest.raises(Malformed):
+                        decode_any(kind, payload)
 
 
 def test_unknown_and_missing_fields_are_refused() -> None:

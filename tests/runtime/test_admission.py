@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from foosim.common.addresses import parse_address
-from foosim.runtime.transport.admission import ADMISSION_NS, Admission
+from foosim.runtime.transport.admission import ADMISSION_NS, REMINDER_NS, Admission, Exposure
 from foosim.runtime.transport.certificates import Credentials, NotAuthorised
-from foosim.runtime.transport.open_plane_warning import EVERY_NS, Exposure
 
 WHO = Credentials("node.green", Path("ca.pem"), Path("node.green.pem"), Path("node.green.key"))
 
@@ -31,8 +30,8 @@ def test_who_has_heard_the_router_is_in_for_good() -> None:
 
 def test_an_open_plane_is_said_at_once_and_every_minute() -> None:
     exposure = Exposure(parse_address("0.0.0.0:7400"), 7)
-    said = [now_ns for now_ns in range(7, 7 + 3 * EVERY_NS, EVERY_NS // 10) if exposure.due(now_ns)]
-    assert said == [7, 7 + EVERY_NS, 7 + 2 * EVERY_NS]
+    said = [now_ns for now_ns in range(7, 7 + 3 * REMINDER_NS, REMINDER_NS // 10) if exposure.due(now_ns)]
+    assert said == [7, 7 + REMINDER_NS, 7 + 2 * REMINDER_NS]
     assert "any process that reaches tcp/192.168.0.1:5 can take part" in Exposure(
         parse_address("192.168.0.1:5"), 0
     ).due(0)
@@ -40,4 +39,4 @@ def test_an_open_plane_is_said_at_once_and_every_minute() -> None:
 
 @pytest.mark.parametrize("address", ["tcp/127.0.0.1:7400", "tcp/[::1]:7400", "tls/0.0.0.0:7400", "tls/10.0.0.1:1"])
 def test_a_plane_that_is_not_open_says_nothing(address: str) -> None:
-    assert Exposure(parse_address(address), 0).due(10 * EVERY_NS) == ""
+    assert Exposure(parse_address(address), 0).due(10 * REMINDER_NS) == ""

@@ -12,6 +12,8 @@ import pytest
 
 from foosim.runtime import journal as journal_module
 from foosim.runtime.journal import (
+    FRAMING_BYTES,
+    HEAD_BYTES,
     Journal,
     JournalDamaged,
     JournalError,
@@ -20,7 +22,6 @@ from foosim.runtime.journal import (
     read_newest,
     read_records,
 )
-from foosim.runtime.journal_format import FRAMING_BYTES, HEAD_BYTES
 
 RECORDS = [b"", b"\x00", b"first", bytes(range(256)) * 2, b"\xff" * 7, b"last"]
 

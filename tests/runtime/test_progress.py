@@ -12,8 +12,7 @@ import pytest
 from foosim.common.errors import BadValue, Failed
 from foosim.protocol.actions import Action
 from foosim.protocol.channels import Channel
-from foosim.runtime.health import probe_file
-from foosim.runtime.progress import EVERY_NS, NoProgress, ProgressFile, age_ns
+from foosim.runtime.health import EVERY_NS, NoProgress, ProgressFile, age_ns, probe_file
 from foosim.runtime.roles.loop import Loop
 from foosim.runtime.roles.role import Role
 from foosim.runtime.transport.inbox import Inbox

@@ -17,12 +17,10 @@ from foosim.node.tick import Stepper
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import CAPTURE, DONE_OF, SAMPLES_OF, Heartbeat, Request, Want
+from foosim.protocol.messages import CAPTURE, Request, Want
 from foosim.simulation.run import rehearse, with_nodes
 from foosim.simulation.system import IDLE_NS_MAX, OPERATOR, Settings, System
-from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.settings import RunSettings
-from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
 from foosim.vhub.wait_times import WaitTimes
 from foosim.world.frame import Frame
@@ -94,6 +92,7 @@ def test_each_kind_of_process_delayed_is_named_in_the_lag_line(process: str, del
 
 def test_a_run_in_time_names_nobody() -> None:
     seen = Seen().go()
+    seen.system.supervisor.progress.on_heartbeat(replace(seen.system.hub.heartbeat(), waiting_for="commit"))
     assert set(seen.late.values()) == {""} and not [line for line in seen.lines if "lag" in line]
     assert seen.system.supervisor.status(0)["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
 
@@ -388,88 +387,25 @@ def test_nobody_is_overdue_while_the_run_is_paused() -> None:
     assert lines == [f"run ends at tick {TICKS}: done"]
 
 
-# --- the progress monitor by itself ----------------------------------------------------------------------------------
-
-
-def monitor() -> ProgressMonitor:
-    settings = RunSettings("run", TABLE.name, with_nodes(TEXT, TABLE.name, 2), Pace("realtime"))
-    made = ProgressMonitor(RunState(settings, bytes(32), "boot", "clock"), 0)
-    made.begun(0)
-    made.committed(10, 0, 0, 20 * MS)
-    return made
-
-
-def told(waiting_for: str, tick: int) -> Heartbeat:
-    return Heartbeat(VHUB, tick, 1, waiting_for, "", 0.0, b"")
-
-
 @pytest.mark.parametrize(
-    ("said", "name"),
-    [("", VHUB), (DONE_OF + "player-red", "player-red"), (SAMPLES_OF + "n2", "n2"), ("commit", VHUB)],
+    ("samples_ms", "done_ms", "busy_ms", "least_ms", "cause"),
+    [
+        (15, 18, 0, 1, "samples of n2"),
+        (12, 18, 0, 1, "Done of player-red"),
+        (10, 10, 0, 1, ""),
+        (12, 15, 0, 4, ""),
+        (10, 20, 10, 1, ""),
+        (10, 20, 3, 7, "Done of player-red"),
+    ],
 )
-def test_late_deliveries_are_blamed_on_whom_the_vhub_named(said: str, name: str) -> None:
-    made = monitor()
-    made.released(10, 20 * MS)
-    made.on_heartbeat(told(said, 9))
-    made.on_heartbeat(told(DONE_OF + "player-blue", 7))
-    made.delivered(10, 30 * MS)
-    for node in ("n1", "n2"):
-        made.part(10, node, 31 * MS)
-    line = made.committed(11, 9 * MS, 20 * MS, 31 * MS)
-    assert made.late == name and line == f"tick 11: lag 9.0 ms, waited for {name} (1 late ticks)"
-
-
-def test_the_slowest_node_counts_from_when_it_had_its_inputs() -> None:
-    made = monitor()
-    made.released(10, 20 * MS)
-    made.delivered(10, 24 * MS)
-    made.part(10, "n1", 25 * MS)
-    made.part(10, "n2", 30 * MS)
-    made.committed(11, 8 * MS, 20 * MS, 30 * MS)
-    assert made.late == "n2", "6 ms after the 4 ms of the vHub"
-
-
-def test_what_the_supervisor_was_busy_counts_for_nobody_else() -> None:
-    made = monitor()
-    made.released(10, 20 * MS)
-    made.took(20 * MS, 28 * MS)
-    made.delivered(10, 28 * MS)
-    made.part(10, "n1", 29 * MS)
-    made.part(10, "n2", 29 * MS)
-    made.committed(11, 7 * MS, 20 * MS, 29 * MS)
-    assert made.late == SUPERVISOR
-
-
-def test_waiting_for_the_clock_is_nobodys_fault() -> None:
-    made = monitor()
-    made.released(10, 40 * MS)
-    made.delivered(10, 21 * MS)
-    made.part(10, "n1", 44 * MS)
-    made.part(10, "n2", 41 * MS)
-    made.committed(11, 2 * MS, 40 * MS, 44 * MS)
-    assert made.late == "n1"
-
-
-# --- what the vHub measures ------------------------------------------------------------------------------------------
-
-
-def closed(commit_ms: int, samples_ms: int, done_ms: int, busy_ms: int = 0, least_ms: int = 1) -> str:
+def test_the_vhub_names_whom_it_waited_for_longest(
+    samples_ms: int, done_ms: int, busy_ms: int, least_ms: int, cause: str
+) -> None:
+    """If that was long enough to matter, and without the time in which it was busy itself."""
     waits = WaitTimes()
     waits.node, waits.client = "n2", "player-red"
-    waits.begin(commit_ms * MS)
-    waits.begin((commit_ms + 1) * MS)
+    waits.begin(10 * MS)
+    waits.begin(11 * MS)
     waits.close_world(samples_ms * MS)
     waits.took(samples_ms * MS, (samples_ms + busy_ms) * MS)
-    return waits.close(done_ms * MS, least_ms * MS)
-
-
-def test_the_vhub_names_whom_it_waited_for_longest() -> None:
-    assert closed(10, 15, 18) == "samples of n2"
-    assert closed(10, 12, 18) == "Done of player-red"
-    assert closed(10, 10, 10) == ""
-    assert closed(10, 12, 15, least_ms=4) == "", "less than what matters"
-
-
-def test_what_the_vhub_was_busy_itself_counts_for_nobody() -> None:
-    assert closed(10, 10, 20, busy_ms=10) == ""
-    assert closed(10, 10, 20, busy_ms=3, least_ms=7) == "Done of player-red"
+    assert waits.close(done_ms * MS, least_ms * MS) == cause

@@ -8,8 +8,9 @@ import pytest
 
 from foosim.common.units import Pace
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.protocol.codec import encode
+from foosim.protocol.codec import decode
 from foosim.protocol.fingerprint import library_fingerprint
+from foosim.protocol.messages import Epoch
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import History, fold
@@ -75,35 +76,31 @@ def watched() -> Watched:
 
 def content(history: History) -> tuple[object, ...]:
     """Everything in a history, in a form that compares."""
-    frame = history.frame
-    edits = {tick: edits for tick, edits in history.edits.items() if edits}
-    epoch = None if history.epoch is None else encode(history.epoch)
-    told = history.answers, history.control
-    return history.run, frame.tick, frame.digest, frame.layout.names, epoch, edits, told
+    kept, frame = history
+    told = kept.epoch, kept.edits, kept.answers, kept.control, kept.owners
+    return kept.run, frame.tick, frame.digest, frame.layout.names, *told
 
 
 def test_a_fold_of_all_records_gives_the_last_commit_and_every_answer(watched: Watched) -> None:
-    history = fold(DEPLOYMENT, watched.records)
-    assert (history.frame.tick, history.frame.digest) == (TICKS, watched.supervisor.state.frame.digest)
-    assert history.epoch is not None
-    assert (history.epoch.epoch, set(dict(history.epoch.owners).values())) == (3, {"blue"})
-    assert history.answers == {(answer.sender, name): answer for name, answer in watched.answers.items()}
-    assert history.run.deployment == TEXT
+    kept, frame = history = fold(DEPLOYMENT, watched.records)
+    assert (frame.tick, frame.digest) == (TICKS, watched.supervisor.state.frame.digest)
+    epoch = decode(Epoch, kept.epoch)
+    assert (epoch.epoch, set(dict(epoch.owners).values())) == (3, {"blue"})
+    assert {answer.id: answer for answer in kept.answers} == watched.answers
+    assert kept.run.deployment == TEXT
     again = SupervisorCore(watched.settings_of_run, library_fingerprint(), 0, "another", history=history)
-    assert again.state.control() == watched.supervisor.state.control() == history.control
-    assert (history.control.stopped, history.control.starts) == (["red"], {"red": 1})
+    assert again.state.control() == watched.supervisor.state.control() == kept.control
+    assert (kept.control.stopped, kept.control.starts) == (["red"], {"red": 1})
 
 
 def test_a_request_is_in_the_journal_before_the_tick_at_which_it_takes_effect(watched: Watched) -> None:
-    pushed = watched.answers["request-1"]
-    cut = next(
-        count
-        for count in range(1, len(watched.records))
-        if (pushed.sender, pushed.id) in fold(DEPLOYMENT, watched.records[:count]).answers
-    )
-    history = fold(DEPLOYMENT, watched.records[:cut])
-    assert history.frame.tick <= pushed.tick
-    assert [edit.name for edit in history.edits[pushed.tick] if isinstance(edit, Push)] == ["ball"]
+    pushed, moved = watched.answers["request-1"], watched.answers["request-3"]
+    folds = (fold(DEPLOYMENT, watched.records[:count]) for count in range(1, len(watched.records)))
+    kept, frame = next(history for history in folds if pushed in history.kept.answers)
+    assert frame.tick <= pushed.tick
+    assert [edit.name for edit in kept.edits[pushed.tick] if isinstance(edit, Push)] == ["ball"]
+    kept = next(history.kept for history in folds if moved in history.kept.answers)
+    assert kept.owners["red.goal"] == "blue" != dict(decode(Epoch, kept.epoch).owners)["red.goal"]
 
 
 def test_a_further_file_says_what_the_ones_before_said(watched: Watched) -> None:

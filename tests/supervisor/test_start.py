@@ -199,7 +199,7 @@ def test_a_resume_that_fails_leaves_the_run_as_it_was(sets: tuple[str, ...], lat
     run.go()
     assert run.core.state.end is None and run.core.state.abandoned == reason
     assert f"the run does not continue from tick {run.core.state.frame.tick}: {reason}" in run.lines
-    assert fold(run.core.state.deployment, run.system.journal).end is None and not run.system.hub.finished
+    assert fold(run.core.state.deployment, run.system.journal).kept.end is None and not run.system.hub.finished
     run.end_all()
     run.system._timers.clear()
     run.system.start(SUPERVISOR)

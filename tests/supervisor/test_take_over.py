@@ -10,8 +10,7 @@ def test_after_a_take_over_no_more_answers_are_kept_than_before() -> None:
     state = Run().system.supervisor.state
     history = fold(state.deployment, [encode(state.run_record)])
     answers = [Answer("one", f"r{n}", True, n, "", b"") for n in range(ANSWERS_KEPT + 50)]
-    for answer in answers:
-        history.answers.keep(answer)
+    history.kept.answers.extend(answers)
     state.restore(history)
     assert list(state.answers.values()) == answers[-ANSWERS_KEPT:]
 

@@ -181,7 +181,7 @@ def test_a_status_has_what_was_asked_for_last_also_after_a_loss_of_the_superviso
     }
     deployment = system.supervisor.state.deployment
     kept = list(system.supervisor.state.last_requests)
-    assert fold(deployment, system.journal).requests == kept == fold(deployment, heads).requests
+    assert fold(deployment, system.journal).kept.requests == kept == fold(deployment, heads).kept.requests
 
 
 # --- a core alone ----------------------------------------------------------------------------------------------------

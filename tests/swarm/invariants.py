@@ -263,13 +263,13 @@ class Laws:
         hold(not asked, f"{asked} are not answered")
         untold = self._told.keys() - self._captured_told
         hold(not untold, f"losses and returns of ticks {sorted(untold)} are not in the capture")
-        history = fold_supervisor(self._deployment, self._journals[channels.SUPERVISOR])
+        kept, frame = fold_supervisor(self._deployment, self._journals[channels.SUPERVISOR])
         hold(
-            history.chain == self._chains[self.committed] and history.frame.digest == supervisor.state.frame.digest,
+            kept.chain == self._chains[self.committed] and frame.digest == supervisor.state.frame.digest,
             "another chain is folded",
         )
-        hold(history.epoch is not None and history.epoch.epoch == supervisor.state.epoch, "another epoch is folded")
-        hold(history.owners == supervisor.state.owners and not history.edits, "other owners or edits are folded")
+        hold(kept.epoch == supervisor.state.epoch_payload, "another epoch is folded")
+        hold(kept.owners == supervisor.state.owners and not kept.edits, "other owners or edits are folded")
         state = system.hub.state
         assert state is not None
         for folded, _ in fold_hub(self._deployment, self._journals[channels.VHUB]):

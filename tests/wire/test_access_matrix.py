@@ -334,16 +334,6 @@ def test_who_has_no_certificate_of_this_root_is_told_so(
         Session.client(router.locator, LONG_S, security=Security(ours)).close()
 
 
-def test_clients_without_a_certificate_are_refused_by_the_radio_plane(folder: Path, deployment: Deployment) -> None:
-    server, ours = load_credentials(folder, "vhub"), load_credentials(folder, "client.hand")
-    assert server is not None and ours is not None
-    context = ssl.create_default_context(cafile=str(ours.ca))
-    with Session.router("127.0.0.1", security=Security(server, access_to(Plane.RADIO, deployment))) as router:
-        with pytest.raises(ssl.SSLError, match="CERTIFICATE_REQUIRED"):
-            shake(router.locator, context)
-        Session.client(router.locator, LONG_S, security=Security(ours)).close()
-
-
 def shake(locator: str, context: ssl.SSLContext) -> None:
     """Perform a TLS handshake with a router, and read its alert if it has one."""
     host, _, port = locator.partition("/")[2].rpartition(":")

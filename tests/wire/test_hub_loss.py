@@ -16,7 +16,7 @@ from foosim.client.client import connect
 from foosim.client.control import Control
 from foosim.client.errors import RunEnded
 from foosim.deployment.loader import load_deployment
-from foosim.runtime.closed import CLOSED
+from foosim.runtime.roles.standstill import CLOSED
 from foosim.simulation.run import rehearse
 from tests.wire.conftest import LIMIT_S, LONG, NO_CAPTURE_TO_CLOSE, in_process
 from tests.wire.test_run import NODES, last_json

@@ -24,7 +24,7 @@ from foosim.library.table.settings import LINE_NAMES, TEAMS
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
-from foosim.runtime.closed import CLOSED
+from foosim.runtime.roles.standstill import CLOSED
 from foosim.runtime.transport.inbox import Inbox
 from foosim.simulation.verify import verify_capture
 from foosim.world.frame import frame_from_bytes
@@ -424,21 +424,6 @@ class Dozes(Sensor):
             time.sleep(1.0)
         return Nothing(0.0)
 """
-
-
-def test_a_component_that_takes_a_second_is_the_lag_of_its_node(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However slow the machine is otherwise: nobody else is waited for at that tick."""
-    (house.folder / "dozes.py").write_text(DOZES)
-    monkeypatch.setenv("PYTHONPATH", str(house.folder))
-    own = "robots.red.goal.sensors.dozes={kind: 'dozes:Dozes', rate: 100 Hz}"
-    up = house.up(
-        *("--set", own, "--set", "engine=pure", "--for", "60 ms", "--pace", "realtime", "--no-capture"),
-        *in_process("main", "nodes.blue"),
-    )
-    code, out, err = house.end(up)
-    assert code == 0, (out, err)
-    logs = "".join(path.read_text() for path in (house.folder / "state" / "foosim" / "runs").glob("*/logs/*"))
-    assert re.search(r"tick 1[01]: lag \d+\.\d ms, waited for red\n", logs), logs
 
 
 def test_a_component_that_hangs_is_named_with_its_node(house: House, monkeypatch: pytest.MonkeyPatch) -> None:

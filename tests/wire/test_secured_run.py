@@ -11,7 +11,7 @@ from foosim.client import control
 from foosim.client.client import connect
 from foosim.client.control import Control
 from foosim.launcher import pki
-from foosim.runtime.closed import CLOSED
+from foosim.runtime.roles.standstill import CLOSED
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.simulation.run import rehearse
 from tests.wire.conftest import LIMIT_S, House, in_process

@@ -6,9 +6,9 @@ A supervisor that takes over may lack the last one, and gets it from here.
 from __future__ import annotations
 
 from foosim.common import limits
-from foosim.common.errors import Malformed
+from foosim.protocol.barrier import committed_frame
 from foosim.protocol.messages import Commit
-from foosim.world.frame import Frame, chain_next, frame_from_bytes
+from foosim.world.frame import Frame, chain_next
 from foosim.world.layout import Layout
 
 Committed = tuple[bytes, Commit, Frame]
@@ -72,9 +72,7 @@ class Commits:
 
     def _read(self, commit: Commit, payload: bytes) -> int:
         assert self.layout is not None
-        frame = frame_from_bytes(commit.tick, self.layout, commit.values, commit.outboxes)
-        if frame.digest != commit.digest:
-            raise Malformed(f"commit {commit.tick} whose frame has another digest")
+        frame = committed_frame(commit, self.layout)
         chain, begins = self._chains[commit.tick - 1], commit.tick - 1 not in self._frames
         self._chains[commit.tick] = chain if begins else chain_next(chain, commit.digest)
         self.next_tick += 1

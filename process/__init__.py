@@ -1,1 +1,0 @@
-"""A process with several roles: supervisor, vHub, nodes and players on one loop."""
