@@ -118,7 +118,11 @@ def supervisor_records(folder: RunFolder, options: RunOptions) -> list[bytes]:
 
 
 def _checked(
-    folder: RunFolder, options: RunOptions, stem: str, records: Iterable[bytes], last_tick: Callable[[list[bytes]], int]
+    folder: RunFolder,
+    options: RunOptions,
+    stem: str,
+    records: Iterable[bytes],
+    last_tick: Callable[[list[bytes]], int],
 ) -> list[bytes]:
     whole, damaged = read_whole(records)
     if damaged is None and whole:

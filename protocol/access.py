@@ -169,7 +169,13 @@ def access_control(access: Access) -> dict[str, Any]:
                 rules.append(_rule(named[-1], flow, messages, keys))
         subjects.append({"id": its.identity, "link_protocols": ["tls"], "cert_common_names": [its.identity]})
         policies.append({"subjects": [its.identity], "rules": named})
-    return {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies}
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
 
 
 def _rule(name: str, flow: str, messages: tuple[str, ...], keys: list[str]) -> dict[str, Any]:

@@ -67,7 +67,12 @@ def _simulation(
 
 
 def _radio(
-    name: str, message: Any, writers: str, readers: str, rate: str, bytes_max: int = limits.RADIO_MESSAGE_BYTES_MAX
+    name: str,
+    message: Any,
+    writers: str,
+    readers: str,
+    rate: str,
+    bytes_max: int = limits.RADIO_MESSAGE_BYTES_MAX,
 ) -> Channel:
     key = f"foosim/radio/{name}/{{name}}"
     return Channel(name, key, message, Plane.RADIO, writers, readers, rate, True, bytes_max)

@@ -133,12 +133,14 @@ def _show_version(wanted: bool) -> None:
 
 
 VersionOption = Annotated[
-    bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    bool,
+    typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
 ]
 
 
 PkiOption = Annotated[
-    Path | None, typer.Option("--pki", envvar=PKI_VARIABLE, help="Folder with ca.pem, the certificate and its key.")
+    Path | None,
+    typer.Option("--pki", envvar=PKI_VARIABLE, help="Folder with ca.pem, the certificate and its key."),
 ]
 
 

@@ -61,7 +61,8 @@ def age_ns(path: Path, now_ns: int) -> int:
 
 
 ProgressOption = Annotated[
-    Path | None, typer.Option("--progress-file", help="File that shows progress, read by foosim probe.")
+    Path | None,
+    typer.Option("--progress-file", help="File that shows progress, read by foosim probe."),
 ]
 """The option of a process with a progress file."""
 

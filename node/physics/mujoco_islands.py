@@ -39,7 +39,18 @@ from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.matter.physics import Physics
-from foosim.world.scene import MOVING, ORIGIN, Body, Quaternion, Shape, Vector, load_of, moved, multiply, rotate
+from foosim.world.scene import (
+    MOVING,
+    ORIGIN,
+    Body,
+    Quaternion,
+    Shape,
+    Vector,
+    load_of,
+    moved,
+    multiply,
+    rotate,
+)
 
 MODELS_MAX: Final = 128
 """The count of models, the latest ones, that an engine keeps."""

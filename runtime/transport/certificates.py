@@ -21,7 +21,12 @@ from foosim.common import wall_clock
 from foosim.common.addresses import parse_address
 from foosim.common.errors import Refused
 from foosim.protocol.identity import parse_identity
-from foosim.runtime.transport.certificate_folder import CA_FILE, CERTIFICATE_SUFFIX, KEY_SUFFIX, CertificateError
+from foosim.runtime.transport.certificate_folder import (
+    CA_FILE,
+    CERTIFICATE_SUFFIX,
+    KEY_SUFFIX,
+    CertificateError,
+)
 
 OPERATOR_VARIABLE: Final = "FOOSIM_OPERATOR"
 """Names the operator whose certificate control commands show, where there are several."""

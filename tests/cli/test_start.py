@@ -29,7 +29,11 @@ HEAVY = {
 
 @pytest.mark.parametrize(
     ("words", "needed"),
-    [(["--help"], set()), (["up", "--help"], set()), (["check", TABLE], {"yaml", "foosim.deployment.schema"})],
+    [
+        (["--help"], set()),
+        (["up", "--help"], set()),
+        (["check", TABLE], {"yaml", "foosim.deployment.schema"}),
+    ],
 )
 def test_a_command_imports_what_it_needs(words: list[str], needed: set[str]) -> None:
     done = subprocess.run(

@@ -252,7 +252,10 @@ def test_without_a_live_run_there_is_nobody_to_control(command: Command, argumen
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("rate", "quick"), "foosim rate PACE: not a pace (realtime, fast or a factor such as 2x), 'quick'"),
+        (
+            ("rate", "quick"),
+            "foosim rate PACE: not a pace (realtime, fast or a factor such as 2x), 'quick'",
+        ),
         (("rate", "0x"), "foosim rate PACE: out of range 0.001x to 1000x, '0x'"),
         (("rate", "-1x"), "foosim rate PACE: out of range 0.001x to 1000x, '-1x'"),
         (

@@ -35,7 +35,16 @@ def test_a_player_that_hangs_shows_where_before_it_is_killed(
     with log.open("wb") as file:
         process = subprocess.Popen([sys.executable, "-c", HANGS], stdout=subprocess.PIPE, stderr=file, process_group=0)
     assert process.stdout is not None and process.stdout.readline() == b"ready\n"
-    child = launcher.children["player-red"] = Child("player-red", ("foosim", "role", "player"), log, process)
+    child = launcher.children["player-red"] = Child(
+        "player-red",
+        (
+            "foosim",
+            "role",
+            "player",
+        ),
+        log,
+        process,
+    )
     end(launcher, child)
     assert process.wait() == -signal.SIGUSR1
     assert "in hangs\n" in log.read_text()

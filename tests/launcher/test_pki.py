@@ -20,7 +20,12 @@ from foosim.launcher import pki
 from foosim.runtime.transport import certificates
 from foosim.runtime.transport.certificate_files import hosts_of, read_certificate
 from foosim.runtime.transport.certificate_folder import CertificateError
-from foosim.runtime.transport.certificates import check_host, load_credentials, operator_credentials, viewer_credentials
+from foosim.runtime.transport.certificates import (
+    check_host,
+    load_credentials,
+    operator_credentials,
+    viewer_credentials,
+)
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 
@@ -112,7 +117,11 @@ SPOILED: Final[tuple[tuple[dict[str, str | bytes | None], float, str], ...]] = (
     ({}, 91, r"node\.red\.pem: expired on .* UTC; foosim pki init .* FILE"),
     ({}, -2 / 24, r"ca\.pem: valid from .* mind the clock"),
     ({}, 3700, r"ca\.pem: expired on"),
-    ({"node.red.key": "node.blue.key"}, 0, r"node\.red\.key: the key does not belong to the certificate node"),
+    (
+        {"node.red.key": "node.blue.key"},
+        0,
+        r"node\.red\.key: the key does not belong to the certificate node",
+    ),
     (
         {"node.red.pem": "node.blue.pem", "node.red.key": "node.blue.key"},
         *(0, r"node\.red\.pem: a certificate of 'node\.blue', not of node\.red"),

@@ -32,7 +32,11 @@ def test_words_go_through_the_shell_there_unchanged(words: list[str]) -> None:
     [
         (255, "ssh: connect to host a.lan: No route to host", "host left (a.lan) cannot be reached: ssh: connect to"),
         (255, "Timeout, server a.lan not responding.", "cannot be reached: Timeout, server a.lan not responding."),
-        (255, "root@a.lan: Permission denied (publickey).", "(a.lan): root@a.lan: Permission denied (publickey)."),
+        (
+            255,
+            "root@a.lan: Permission denied (publickey).",
+            "(a.lan): root@a.lan: Permission denied (publickey).",
+        ),
         (126, "", "foosim cannot be run on host left"),
         (137, "", "was killed by signal 9 on host left"),
         (3, "refused", "ended with exit code 3 on host left"),

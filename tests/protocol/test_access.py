@@ -26,7 +26,10 @@ NAMES = st.sampled_from(["a", "a-b", "a_b", "b", "ab", "a-b-c", "request", "all"
 
 
 def deployment(
-    nodes: list[str], clients: list[str], operators: list[str], viewers: list[str] | None = None
+    nodes: list[str],
+    clients: list[str],
+    operators: list[str],
+    viewers: list[str] | None = None,
 ) -> Deployment:
     """The table with other names."""
     content = yaml.safe_load(read_deployment_text(TABLE))

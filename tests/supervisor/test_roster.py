@@ -165,7 +165,9 @@ def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> N
         for build in not_valid:
             process.receive(channels.BUILD, name, encode(build), 0)
             assert process.member.problem.startswith(f"lost {name}: the deployment is not valid on its machine: t:")
-        wrong = [msgspec.structs.replace(right, name="blue")]
+        wrong = [
+            msgspec.structs.replace(right, name="blue"),
+        ]
         for build in wrong:
             process.receive(channels.BUILD, name, encode(build), 0)
         process.receive(channels.BUILD, name, encode(msgspec.structs.replace(right, boot="other")), 0)

@@ -83,7 +83,11 @@ def test_a_node_owns_it_from_the_tick_of_the_one_answer_and_changes_nothing(node
 
 
 REFUSED: Final[tuple[tuple[str, dict[str, Any], str], ...]] = (
-    ("add", {"name": "b", "at": "0,5,0.1"}, "at of b-2: a place that is occupied: b-2 would be in wall-1, "),
+    (
+        "add",
+        {"name": "b", "at": "0,5,0.1"},
+        "at of b-2: a place that is occupied: b-2 would be in wall-1, ",
+    ),
     ("add", {"name": "w-4", "at": "0,-3"}, "at of w-4: a place that is occupied: w-4 would be in w-1"),
     ("add", {"name": "w-4", "at": "0,-3", "node": "n2"}, "at of w-4: a place that is occupied"),
     ("add", {"name": "w-1"}, "w-1 is in the world already"),

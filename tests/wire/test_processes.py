@@ -61,7 +61,10 @@ def test_a_run_with_certificates_has_the_same_bytes_in_every_shape(house: House,
     assert house.processes_with(str(house.folder)) == {}
 
 
-KILLED: Final = {"supervisor and a node": ("supervisor", "nodes.red"), "vhub and a node": ("vhub", "nodes.red")}
+KILLED: Final = {
+    "supervisor and a node": ("supervisor", "nodes.red"),
+    "vhub and a node": ("vhub", "nodes.red"),
+}
 OTHERS: Final = ("nodes.blue", *PLAYERS)
 
 

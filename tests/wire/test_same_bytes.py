@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from tests.wire.conftest import House
 
 TICKS = 300
-KEYS = {*("ticks", "tick_ns", "rtf", "lag_ms", "digest", "packets", "nodes", "moves", "handovers", "score", "capture")}
+KEYS = {
+    *("ticks", "tick_ns", "rtf", "lag_ms", "digest", "packets", "nodes", "moves", "handovers", "score", "capture"),
+}
 PLAYERS = Path(__file__).parent / "players"
 
 
