@@ -133,7 +133,9 @@ def urdf(
 
 
 @app.command()
-def schema(own: Annotated[bool, typer.Option("--own", help="Leave out what other packages bring.")] = False) -> None:
+def schema(
+    own: Annotated[bool, typer.Option("--own", help="Leave out what other packages bring.")] = False,
+) -> None:
     """Print the JSON Schema of deployment files, with the components of all installed packages.
 
     Editors with support of JSON Schema complete and check a file whose first line names it:

@@ -85,7 +85,9 @@ def add(
 
 @app.command()
 def remove(
-    name: Annotated[str, typer.Argument(help="Which entity.")], run: RunOption = None, json: JsonOption = False
+    name: Annotated[str, typer.Argument(help="Which entity.")],
+    run: RunOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Remove an entity from the world; it can be added again."""
     show_answer(control.request("remove", run, name=name), json)

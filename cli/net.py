@@ -66,7 +66,8 @@ def net_group() -> None:
 @app.command()
 def lint(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A deployment, or a file with its network section alone.")
+        Path,
+        typer.Argument(metavar="FILE", help="A deployment, or a file with its network section alone."),
     ],
     sets: Annotated[list[str] | None, typer.Option("--set", help="Change the file; may be repeated.")] = None,
     json: JsonOption = False,
@@ -146,7 +147,10 @@ def presets(
 @app.command()
 def explain(
     capture: Annotated[Path, typer.Argument(metavar="CAPTURE", help="A capture.")],
-    packet: Annotated[str, typer.Argument(metavar="PACKET", help="SOURCE:SEQUENCE[:DESTINATION[:COPY]].")],
+    packet: Annotated[
+        str,
+        typer.Argument(metavar="PACKET", help="SOURCE:SEQUENCE[:DESTINATION[:COPY]]."),
+    ],
     json: JsonOption = False,
 ) -> None:
     """Print the stages of a captured packet with their numbers, and its fate.
@@ -244,7 +248,8 @@ def set_link(
 @app.command()
 def partition(
     groups: Annotated[
-        list[str], typer.Argument(metavar="GROUP GROUP...", help="Endpoints with commas, or rest for all others.")
+        list[str],
+        typer.Argument(metavar="GROUP GROUP...", help="Endpoints with commas, or rest for all others."),
     ],
     lasts: Lasts = None,
     random: Random = False,

@@ -36,7 +36,11 @@ app = new_app()
 
 @app.command()
 @with_options()
-def run_supervisor(options: RunOptions, run: NewRunOption = None, progress_file: ProgressOption = None) -> None:
+def run_supervisor(
+    options: RunOptions,
+    run: NewRunOption = None,
+    progress_file: ProgressOption = None,
+) -> None:
     """Run a supervisor only.
 
     The vHub, nodes and players are started separately. The run's folder has the run file, logs and journals.

@@ -27,7 +27,8 @@ app = new_app()
 
 ConsoleOption = Annotated[bool, typer.Option("--console", help="Serve the console of the run; its address is printed.")]
 Second = Annotated[
-    Path | None, typer.Option(metavar="CAPTURE|CSV", help="A recording that the console shows beside the run.")
+    Path | None,
+    typer.Option(metavar="CAPTURE|CSV", help="A recording that the console shows beside the run."),
 ]
 Offset = Annotated[str | None, typer.Option(help="Time in --second at time 0 of the run, e.g. 2.5s or -1s.")]
 BESIDE_RESUME: Final = ("resumed", "console", "open_browser", "second", "offset", "pki", "json")

@@ -87,7 +87,8 @@ def diff(
     one: Annotated[Path, typer.Argument(metavar="A", help="A capture.")],
     other: Annotated[Path, typer.Argument(metavar="B", help="Another one.")],
     ignore: Annotated[
-        list[str] | None, typer.Option(help="Do not compare this field (digest) or channel (/epochs); may be repeated.")
+        list[str] | None,
+        typer.Option(help="Do not compare this field (digest) or channel (/epochs); may be repeated."),
     ] = None,
     json: JsonOption = False,
 ) -> None:

@@ -29,7 +29,8 @@ LINKS_SHOWN = 40
 def what_if(
     capture: Capture,
     network: Annotated[
-        Path | None, typer.Option(help="A deployment, or a file with its `network:` section alone.")
+        Path | None,
+        typer.Option(help="A deployment, or a file with its `network:` section alone."),
     ] = None,
     settings: Annotated[
         list[str] | None,

@@ -72,7 +72,10 @@ class MatchOptions:
 
 @app.command()
 @with_options()
-def foosim_match(options: MatchOptions, json: JsonOption = False) -> None:
+def foosim_match(
+    options: MatchOptions,
+    json: JsonOption = False,
+) -> None:
     """Let two players play many games, and show which is better.
 
     Each game is a rehearsal of the deployment with the classes A and B in the places of its two players, and with a
