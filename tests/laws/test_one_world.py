@@ -320,7 +320,7 @@ def test_what_is_held_is_in_the_island_of_its_holders_and_is_handed_over() -> No
 
 
 # --- planted faults --------------------------------------------------------------------------------------------------
-# Faults of the engines are planted in `test_engine_partition.py`, of speaking and committing in `test_trace_laws.py`.
+# Faults of the engines are planted in `test_engine_partition.py`, of speaking and committing in `tests/gate/`.
 
 
 def rebuild_all(system: System) -> None:
