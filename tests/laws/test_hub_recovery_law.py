@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from foosim.capture.rows import RECOVERIES
 from foosim.common import limits
@@ -103,16 +101,13 @@ def kill_hub(ending: Ending = "now", back_ns: int = 300 * MS) -> Callable[[Syste
     return lambda system: system.kill_hub(ending, back_ns)
 
 
-def assert_the_same(seen: Seen, usual: Seen, is_calm: bool = True) -> None:
-    """Equal frames, fates and deliveries; each tick was captured once; each player was told everything once.
-
-    The result has the packets as the vHub's farewell tells them, which bad weather may lose.
-    """
+def assert_the_same(seen: Seen, usual: Seen) -> None:
+    """Equal frames, fates and deliveries; each tick was captured once; each player received everything once."""
     assert seen.run.json["reason"] == "done" and not seen.run.json["failed"]
     assert seen.run.digests == usual.run.digests
     assert [c.frame.tick for c in seen.closings] == [c.frame.tick for c in usual.closings]
     assert seen.rows() == usual.rows(), "every packet with its fate, every delivery, every join"
-    assert not is_calm or seen.run.json["packets"] == usual.run.json["packets"]
+    assert seen.run.json["packets"] == usual.run.json["packets"]
     for tick, payloads in seen.deliveries.items():
         assert len(payloads) == 1, f"deliveries {tick} are said in {len(payloads)} ways"
     assert seen.told == usual.told, "the same Gos with the same numbers, byte for byte"
@@ -176,24 +171,6 @@ def test_an_epoch_that_is_older_than_the_newest_in_the_journal_is_refused() -> N
     assert_the_same(seen, undisturbed())
     assert cores[0] is not cores[1] and epochs == [2, 2]
     assert all(core.epoch == 2 and set(core._owners.values()) == {"n1", "n2"} for core in cores)
-
-
-KILLS: Final = st.lists(
-    st.tuples(st.integers(1, TICKS - 1), st.sampled_from(ENDINGS), st.sampled_from([1, 40, 300])),
-    min_size=1,
-    max_size=8,
-)
-
-
-@settings(max_examples=5)
-@given(kills=KILLS, weather=st.sampled_from([None, 1, 2]))
-@example(kills=[(5, "unpublished", 1), (6, "torn", 1), (9, "now", 40)], weather=3)
-def test_whenever_it_is_killed_the_world_is_the_same(kills: list[Any], weather: int | None) -> None:
-    """Also on a bus that delays, repeats and loses."""
-    bad = Weather(weather, 100_000, 2 * MS, loss=0.02, repeat=0.05) if weather is not None else Weather()
-    planned = [(tick, kill_hub(ending, back_ms * MS)) for tick, ending, back_ms in kills]
-    seen = fly(planned, sets=(*SETS, "deadlines.lockstep_fast=1 h", "deadlines.client_back=1 h"), weather=bad)
-    assert_the_same(seen, undisturbed(), is_calm=weather is None)
 
 
 class _Forgetful(HubCore):
