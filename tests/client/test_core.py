@@ -22,6 +22,7 @@ from foosim.protocol.channels import CLIENT_READS, Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import (
     Build,
+    ClientHello,
     ClientRefusal,
     ClientWelcome,
     Commit,
@@ -293,6 +294,20 @@ def test_downlinks_in_another_order_are_all_taken_and_once_each() -> None:
     assert [packet.sequence for packet in core.arrivals] == [1, 4, 2, 3]
     assert (core.statistics().missing, core.statistics().repeated, core.statistics().downlinks) == (0, 3, 4)
     assert core.tick == 4, "the newest tick stays"
+
+
+@pytest.mark.parametrize(("numbers", "received"), [((), 0), ((1, 2), 2), ((1, 2, 4, 5), 2), ((1, 3, 2), 3)])
+def test_a_hello_to_a_vhub_that_is_back_names_the_last_downlink_without_a_gap(
+    numbers: tuple[int, ...], received: int
+) -> None:
+    """The vHub sends those above it again, and no other."""
+    core = in_run()
+    taken(core, *[down(number) for number in numbers])
+    published(core)
+    core.hub_gone(0)
+    core.wake(0)
+    (hello,) = [decode(ClientHello, one.payload) for one in published(core) if one.channel is channels.CLIENT_HELLO]
+    assert hello.received == received
 
 
 def test_what_is_not_taken_in_time_is_counted() -> None:

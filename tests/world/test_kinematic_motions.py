@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import cos, hypot, pi, sin, sqrt
 from typing import Any, Final
 
+import numpy as np
 import pytest
 
 from foosim.library.mobile.v_w import Motion
@@ -125,6 +126,11 @@ def test_a_wheel_that_slips_rolls_less_far_than_it_turns() -> None:
     assert yard.vector("r", "wheel_travel")[0] == pytest.approx(0.005)
     x, y, _ = yard.vector("r", "position")
     assert hypot(x, y) == pytest.approx(0.005 * (1 - sum(slips) / 2), rel=1e-6)
+    assert yard.vector("r", "heading")[0] == pytest.approx(0.005 * (slips[0] - slips[1]) / 0.4), "the right is slower"
+    drawn_slips = np.array([slips_of(yard.deployment, f"r{number}", 0.2) for number in range(1000)])
+    for wheel in drawn_slips.T:
+        assert wheel.mean() == pytest.approx(0.1, abs=3.29 * 0.2 / sqrt(12 * 1000)) and 0.198 < wheel.max() < 0.2
+    assert abs(np.mean((drawn_slips[:, 0] - 0.1) * (drawn_slips[:, 1] - 0.1)) * 300) < 3.29 / sqrt(1000), "of its own"
 
 
 @pytest.mark.parametrize("draw", range(6))

@@ -24,6 +24,7 @@ from foosim.world.edits import Set
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered
+from tests.kinematic_yard import Yard, yard_text
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
@@ -165,6 +166,16 @@ def test_another_frame_has_points_moved_and_turned() -> None:
     (payload,) = Sensing().sample([camera], SensingView(0, numbers))
     assert payload is not None
     assert struct.unpack("<3d", payload) == pytest.approx((0.25, -0.5, 0.125))
+
+
+@pytest.mark.parametrize(("heading", "turned"), [(1.0, 1.0 - pi / 6), (-3.0, 11 * pi / 6 - 3.0), (0.0, -pi / 6)])
+def test_another_frame_has_headings_turned_back_and_within_half_a_turn(heading: float, turned: float) -> None:
+    pose = {"kind": "pose", "rate": "100 Hz", "modifiers": [{"kind": "frame_change", "yaw": "30 deg"}]}
+    yard = Yard(yard_text({"r": {"model": "holonomic", "sensors": {"pose": pose}}}))
+    yard.put("r", "heading", heading)
+    (one,) = sensors_of(yard.deployment, yard.layout, yard.layout["r"])
+    (payload,) = Sensing().sample([one], SensingView(0, yard.numbers))
+    assert payload is not None and struct.unpack("<3d", payload)[2] == pytest.approx(turned)
 
 
 def test_modifiers_work_in_their_order_and_one_of_a_kind_is_not_the_other() -> None:

@@ -9,6 +9,7 @@ from statistics import NormalDist, fmean
 from typing import Final
 
 import numpy as np
+import pytest
 
 from foosim.common.batched.noise import NoiseKey
 from foosim.common.keyed_random import draw_key
@@ -23,6 +24,7 @@ from foosim.world.components.view import SensingView
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
+from tests.own_forms import folder_on_path, written
 
 TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 AT_ONCE: Final = "robots.camera.sensors.ball.modifiers=[{kind: gaussian_noise, std: {x: 1.5 mm, y: 1.5 mm}}]"
@@ -101,6 +103,32 @@ def test_noise_is_keyed_by_seed_robot_and_channel() -> None:
     ]
     assert len({alone, *others}) == 4
     assert sampled(fitted("red.goal", "encoder", second), start, 777) == alone, "what else it has is nothing"
+
+
+def test_a_sensor_draws_by_a_key_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two of one type on a robot draw differently, and a change of one changes no draw of the other."""
+    written(
+        folder_on_path(tmp_path, monkeypatch),
+        "from foosim.common.keyed_random import draw_words, unit_interval",
+        "class Dice(Sensor):",
+        "    def __init__(self, settings, at): self.key = at.key",
+        "    def sample(self, view): return Number(unit_interval(draw_words(self.key, view.tick)[0]))",
+        "sensor('dice', Settings, Number)(Dice)",
+    )
+
+    def drawn(robot: str, channel: str, beside: str, *sets: str) -> list[bytes]:
+        dice = "{kind: 'own_form:Dice', rate: 100 Hz}"
+        its = [f"robots.{name}.sensors={{one: {dice}{beside}}}" for name in ("red.goal", "red.attack")]
+        deployment = deployed("players={}", *its, *sets)
+        numbers = initial_numbers(deployment, build_layout(deployment))
+        return [sampled(fitted(robot, channel, deployment), numbers, tick) for tick in range(20)]
+
+    second = ", two: {kind: 'own_form:Dice', rate: 50 Hz}"
+    alone = drawn("red.goal", "one", "")
+    others = drawn("red.goal", "two", second), drawn("red.attack", "one", ""), drawn("red.goal", "one", "", "seed=2")
+    assert len({*alone}.union(*others)) == 80
+    for beside in (second, second.replace("50 Hz", "100 Hz, count: 3"), ", two: {kind: encoder, rate: 100 Hz}"):
+        assert drawn("red.goal", "one", beside) == alone
 
 
 def test_without_noise_a_sample_is_the_frame() -> None:
