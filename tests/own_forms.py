@@ -18,8 +18,8 @@ from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
 from foosim.world.assembly import used_forms
 from foosim.world.forms import registry
+from tests.deployed import TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 HEAD: Final = """
 from typing import Annotated
 
@@ -129,7 +129,7 @@ def fresh(code: str, folder: Path | None = None) -> Any:
 def problems(*sets: str, text: str = "") -> list[str]:
     """Return what is said of a deployment, the table if no other, with settings: without places in the text."""
     try:
-        apply_sets(text or TABLE.read_text(), TABLE.name, sets)
+        apply_sets(text or TEXT, TABLE.name, sets)
     except DeploymentError as error:
         return [re.sub(r"^\S+:\d+:\d+: ", "", problem) for problem in error.problems]
     return []

@@ -12,13 +12,12 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Final
 
+from tests.deployed import TABLE, TEXT
 from tests.gate.mutants import MUTANTS
 from tests.swarm.campaign import fly
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SEEDS: Final = 1000
 
 
@@ -36,7 +35,7 @@ class Found:
 def find(name: str, seeds: Sequence[int]) -> Found:
     """Fly seeds, one after the other, until one finds a bug."""
     mutant = next(mutant for mutant in MUTANTS if mutant.name == name)
-    text = TABLE.read_text()
+    text = TEXT
     begun_s = time.process_time()
     with mutant.planted():
         for seed in seeds:

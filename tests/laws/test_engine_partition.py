@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from math import cos, pi, sin
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -29,9 +28,9 @@ from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import View
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.scene import Body, Shape
+from tests.deployed import TEXT
 from tests.placing import place_ball
 
-TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 KEY = draw_key(20, "partition")
 RODS_X = (-0.522, -0.373, -0.224, -0.075, 0.075, 0.224, 0.373, 0.522)
 
@@ -99,7 +98,7 @@ class Comparison:
     """One world, computed twice at every tick from the same numbers."""
 
     def __init__(self, factory: EngineFactory, sets: Sequence[str] = (), balls: int = 1, parts: int = 3) -> None:
-        text = apply_sets(TABLE.read_text(), "table.yaml", [*sets, f"table.spare_balls={balls - 1}"])
+        text = apply_sets(TEXT, "table.yaml", [*sets, f"table.spare_balls={balls - 1}"])
         self.deployment = load_deployment(text, "table.yaml").with_assets(FILES)
         self.layout = build_layout(self.deployment)
         self.numbers = initial_numbers(self.deployment, self.layout)

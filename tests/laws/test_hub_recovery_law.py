@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
 from foosim.capture.rows import RECOVERIES
 from foosim.common import limits
-from foosim.deployment.loader import load_deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Epoch, Go
@@ -25,11 +23,10 @@ from foosim.simulation.system import Settings, System
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing
+from tests.deployed import DEPLOYMENT, TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 240
 MS: Final = 1_000_000
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 SETS: Final = ("engine=pure", "table.rules.kickoff_delay=20 ms")
 SLOW: Final = Weather(1, delay_ns=8 * MS)
 """Time passes between what is said and heard."""
@@ -88,7 +85,7 @@ def fly(faults: Sequence[Fault], ticks: int = TICKS, sets: Sequence[str] = SETS,
             system.at_tick(tick, partial(fault, system))
 
     chosen = {"observer": seen.watch, "on_closing": seen.closings.append, **chosen}
-    seen.run = rehearse(TABLE.read_text(), TABLE.name, ticks, 2, sets, Settings(**chosen), prepare=prepare)
+    seen.run = rehearse(TEXT, TABLE.name, ticks, 2, sets, Settings(**chosen), prepare=prepare)
     return seen
 
 
@@ -211,7 +208,7 @@ def test_a_vhub_that_dies_before_the_run_begins_is_waited_for() -> None:
         system.later(30 * MS, partial(kill, system))
 
     chosen = Settings(weather=SLOW, restart_ns=500 * MS)
-    run = rehearse(TABLE.read_text(), TABLE.name, 60, 2, (*SETS, "deadlines.vhub_back=250 ms"), chosen, prepare=prepare)
+    run = rehearse(TEXT, TABLE.name, 60, 2, (*SETS, "deadlines.vhub_back=250 ms"), chosen, prepare=prepare)
     assert run.json["reason"] == "done" and run.json["recoveries"] == [] and early == [True]
     assert run.digests == undisturbed().run.digests[:60]
 

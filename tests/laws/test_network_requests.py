@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from foosim.capture.rows import EPOCHS, RECOVERIES
 from foosim.common.json_text import encode_json
-from foosim.deployment.loader import load_deployment
 from foosim.simulation.journals import ENDINGS, Ending
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
@@ -21,14 +20,14 @@ from foosim.simulation.verify import verify_capture
 from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing
 from foosim.world.edits import Disrupt
+from tests.deployed import DEPLOYMENT, TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 160
 SETS: Final = (
     *("engine=pure", "table.rules.kickoff_delay=20 ms"),
     "network.links=[{id: lan, between: ['*', '*'], delay: 1 ms, jitter: {shape: gamma, sd: 2 ms}, loss: 2 %}]",
 )
-PLAN: Final = plan_of(load_deployment(TABLE.read_text(), TABLE.name))
+PLAN: Final = plan_of(DEPLOYMENT)
 EVENTS: Final[Sequence[tuple[int, dict[str, Any]]]] = (
     (20, {"partition": [["player-red"], ["rest"]], "for": "20 ms"}),
     (40, {"clog": {"from": "camera", "to": "player-*"}}),
@@ -70,7 +69,7 @@ def fly(
 ) -> tuple[list[Any], dict[str, Any]]:
     """Rehearse; return the rows, and the tick of each answer by request."""
     closings: list[Closing] = []
-    text = TABLE.read_text()
+    text = TEXT
     told = Settings(on_closing=closings.append, keeps_journals=True)
     run = rehearse(text, TABLE.name, TICKS, nodes, SETS, told, prepare=prepare, capture=capture)
     assert run.json["reason"] == "done"

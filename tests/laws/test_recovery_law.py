@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -16,8 +15,8 @@ from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.node_loss import NodeLoss
+from tests.deployed import TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
 IMPATIENT: Final = (
     "engine=pure",
@@ -49,7 +48,7 @@ def move(robot: str, node: str) -> Callable[[System], object]:
 
 @cache
 def undisturbed(sets: tuple[str, ...] = PURE, ticks: int = TICKS) -> Rehearsed:
-    return rehearse(TABLE.read_text(), TABLE.name, ticks, 1, sets)
+    return rehearse(TEXT, TABLE.name, ticks, 1, sets)
 
 
 def disturbed(
@@ -60,7 +59,7 @@ def disturbed(
             system.at_tick(tick, partial(fault, system))
 
     pace = chosen.pop("pace", None)
-    return rehearse(TABLE.read_text(), TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare)
+    return rehearse(TEXT, TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare)
 
 
 def told(run: Rehearsed) -> list[tuple[str, str]]:

@@ -15,15 +15,13 @@ from typing import Any, Final
 import pytest
 
 from foosim.common.errors import BadValue, UnknownName
-from foosim.deployment.loader import load_deployment
 from foosim.library.table.players.by_hand import DRAWN_RAD, DRAWN_S, KICK_S, KICKED_RAD, LIFTED_RAD, SWING_RAD_MAX
 from foosim.library.table.players.gamepad import AGAIN_TICKS, Gamepad
 from foosim.library.table.players.keyboard import SLIDE_M, SWING_RAD, Keyboard
 from foosim.library.table.rod_position import Command
 from foosim.library.table.settings import table_of
+from tests.deployed import DEPLOYMENT, TABLE
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 SECOND_TICKS: Final = 1_000_000_000 // DEPLOYMENT.tick_ns
 HALF_STROKE: Final = table_of(DEPLOYMENT).lines["goal"].half_stroke
 PLAYS: Final = f"""

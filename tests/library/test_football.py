@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import cos, hypot, sin
-from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
 from foosim.client.player import Sample
-from foosim.deployment.loader import load_deployment
 from foosim.library.generic.delay import delay_ns
 from foosim.library.table.ball import BallPosition
 from foosim.library.table.encoder import RodPosition
@@ -20,9 +18,8 @@ from foosim.library.table.players.senses import Senses, rods_of
 from foosim.library.table.players.shot import FULL, LIFTED, Shots
 from foosim.library.table.rod_position import Command
 from foosim.library.table.settings import LINE_NAMES, table_of
+from tests.deployed import DEPLOYMENT
 
-TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
 LINES = table_of(DEPLOYMENT).lines
 RADIUS = table_of(DEPLOYMENT).ball.radius
 PERIOD = 5

@@ -262,20 +262,6 @@ def test_no_ball_passes_an_end_wall(world: Make, draws: random.Random, speed: fl
 # --- 9: forces and inertias ------------------------------------------------------------------------------------------
 
 
-def test_a_motor_gives_its_force(bullet: Make, draws: random.Random) -> None:
-    """a = F/m and alpha = tau/I within 0.1 %: with numSubSteps of n Bullet gives n times the force."""
-    one = bullet(NO_GRAVITY)
-    for name in ("red.goal", "red.defence", "blue.midfield", "blue.attack"):
-        force, torque = draws.uniform(10.0, 90.0), draws.uniform(0.1, 0.5)
-        one.set_rod(name, (0.0, 0.0), (0.0, 0.0))
-        for _ in range(5):
-            one.tick({name: ((1000.0, force), (1000.0, torque))}, ball=False)
-        seconds = 5 * one.tick_s
-        slide, spin = one.of(name, "joint_velocities", 2)
-        assert slide / seconds == pytest.approx(force / one.rod_mass(name), rel=0.001)
-        assert spin / seconds == pytest.approx(torque / one.rod_inertia(name), rel=0.001)
-
-
 def test_a_free_rod_keeps_its_speed(bullet: Make) -> None:
     """Bullet's default damping of joints takes a fifth of it in 0.1 s."""
     one = bullet(NO_GRAVITY)

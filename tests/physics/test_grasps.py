@@ -23,7 +23,7 @@ from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
 from tests.forms.worlds import DEPLOY
-from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, porter, world
+from tests.grip_yards import FRONT_M, NAME, SIDE_M, crane, crate, porter, world
 
 GRAVITY: Final = 9.80665
 LEFT_M: Final = 1.0 - SIDE_M / 2
@@ -465,12 +465,3 @@ BASE: Final = {"model": "holonomic", "actuators": {"grip": {"kind": "gripper"}}}
 def test_what_cannot_hold_is_refused(robots: dict[str, Any], more: dict[str, Any], expected: Sequence[str]) -> None:
     found = problem(robots, **more)
     assert all(text in found for text in expected), found
-
-
-def test_lift_is_the_height_of_the_hand() -> None:
-    """The world of these tests is what it says."""
-    with at_crate() as made:
-        poses = {name: place for name, place, _ in forward_kinematics(
-            made.scene.bodies["a"], made.frame.layout["a"], made.frame.numbers
-        )}  # fmt: skip
-        assert poses["a/grip"] == pytest.approx((LEFT_M - 0.01, 0.0, LIFT_M), abs=1e-3)

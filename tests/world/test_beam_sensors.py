@@ -10,7 +10,6 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import BoundSensor, sensors_of
@@ -144,23 +143,6 @@ def test_rays_to_be_drawn_end_where_readings_say(fleet_text: Text, kind: str) ->
     drawn = type(one).rays([one], robot.numbers)
     x, y, z = (drawn[:, 3:] - drawn[:, :3]).T
     assert np.sqrt(x * x + y * y + z * z) == pytest.approx(np.array(robot.read()))
-
-
-@pytest.mark.parametrize(
-    ("settings", "problem"),
-    [
-        ("kind: laser_scanner, rays: 1082, range: 10 m", "eye.rays: more than the most that is valid, 1081, 1082"),
-        ("kind: laser_scanner, rays: 0, range: 10 m", "eye.rays: less than the least that is valid, 1, 0"),
-        ("kind: laser_scanner, rays: 5, angle: 361 deg, range: 10 m", "eye.angle: "),
-        ("kind: range, cone: 121 deg, range: 10 m", "eye.cone: "),
-        ("kind: range, range: 2 km", "eye.range: "),
-    ],
-)
-def test_settings_beyond_their_limits_are_refused_with_their_place(
-    fleet_text: Text, settings: str, problem: str
-) -> None:
-    with pytest.raises(DeploymentError, match=f"robots.rover01.sensors.{problem}"):
-        Robot(fleet_text, settings)
 
 
 def test_many_sensors_together_have_the_bits_of_each_alone(fleet_text: Text) -> None:

@@ -94,14 +94,6 @@ def test_a_new_job_preempts_whosever_runs() -> None:
         assert target(its) == (15.0, 2.0)
 
 
-def test_a_repeat_does_nothing_however_late() -> None:
-    with yard() as its:
-        tell(its, (ANN, 2.0), (BEN, 1.0))
-        assert tell(its, (ANN, 2.0), (ANN, 1.0), (BEN, 1.0)) == [(2, PREEMPTED), (1, RUNNING)]
-        assert target(its) == (11.0, 2.0)
-        assert its.frame.at("base", "refused") == 0.0
-
-
 def test_only_its_owner_cancels() -> None:
     with yard() as its:
         tell(its, (ANN, 1.0))

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
 from math import inf, nan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.library.generic.proximity import Ranges
 from foosim.library.mobile.go_to import Place
 from foosim.library.mobile.wheel_speeds import Drive
 from foosim.library.rigid.joint_position import JointPositions
@@ -31,9 +29,8 @@ from foosim.library.table.rod_position import Command
 from foosim.world.forms.payloads import PayloadCodec, field_at
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component, names
+from tests.deployed import DEPLOYMENT, TABLE
 
-TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
 ENCODER = CommandEncoder(DEPLOYMENT)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 CODECS = {name: codec_of(find_component(form, name)) for form in ("sensor", "actuator") for name in names(form)}
@@ -117,12 +114,6 @@ def test_fields_of_several_numbers_are_of_one_length() -> None:
         codec("joint_state").encode(JointState((0.0, 1.0), (0.0, 1.0), (0.0,)))
     with pytest.raises(BadValue, match=r"joint_state\.efforts is not finite"):
         codec("joint_state").encode(JointState((0.0, 1.0), (0.0, 1.0), (0.0, inf)))
-
-
-def test_one_ray_and_128_are_rays() -> None:
-    for count in (1, 128):
-        ways = tuple(float(ray) for ray in range(count))
-        assert codec("proximity").decode(np.array(ways).tobytes()) == Ranges(ways)
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,8 @@ from foosim.deployment.validate import models_of
 from foosim.world.forms import registry
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
+from tests.deployed import TEXT
 from tests.own_forms import folder_on_path, fresh, install, problems, written
-
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT: Final = TABLE.read_text()
 
 
 @pytest.fixture

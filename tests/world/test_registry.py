@@ -24,10 +24,8 @@ from foosim.simulation.system import Settings
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import FORMS, find, find_component, names
 from foosim.world.frame import Frame
+from tests.deployed import TABLE, TEXT, deployed
 from tests.own_forms import fresh, install, problems
-
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT: Final = TABLE.read_text()
 
 GAUGES: Final = '''
 from typing import Annotated
@@ -427,7 +425,7 @@ def rehearsed(*sets: str, nodes: int = 1, capture: Path | None = None) -> tuple[
 def test_readings_of_a_sensor_of_ones_own_reach_a_player_and_the_capture(tmp_path: Path) -> None:
     hears = listens({"red.goal": ["reach"]}, {"red.goal": 15.0})
     done, frames = rehearsed(REACH, WINCH_OF_GOAL, hears, capture=tmp_path / "run.mcap")
-    deployment = load_deployment(apply_sets(TEXT, TABLE.name, [REACH]), TABLE.name)
+    deployment = deployed(REACH)
     heard = sys.modules["own_listener"].Listener.heard["red.goal", "reach"]
     assert len(heard) >= 5
     for sent_ns, value in heard.items():
@@ -529,5 +527,5 @@ def test_a_sensor_may_have_the_name_of_an_actuator_that_its_robot_does_not_have(
     sensor = "robots.red.goal.sensors={position: {kind: ball, rate: 100 Hz}}"
     for actuators in ("{}", f"{{loop: {LOOP}}}"):
         sets = ["players={}", f"robots.red.goal.actuators={actuators}", sensor]
-        robot = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name).robots["red.goal"]
+        robot = deployed(*sets).robots["red.goal"]
         assert list(robot.sensors) == ["position"] and "position" not in robot.actuators

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import pytest
 
@@ -11,9 +10,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.world.assembly import sections
 from foosim.world.assembly.sections import findings_of, gravity_of, physics_of
 from foosim.world.fixed_scenery import kits_of
-
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
+from tests.deployed import DEPLOYMENT, TABLE
 
 
 def test_the_tables_kit_says_it() -> None:
