@@ -156,7 +156,7 @@ def in_run(name: str = "ear", period: int = 0) -> ClientCore:
 # --- letting in ------------------------------------------------------------------------------------------------------
 
 
-def test_hello_is_said_until_it_is_answered_and_join_until_something_new_has_come() -> None:
+def test_hello_is_repeated_until_the_answer_and_join_until_the_next_downlink() -> None:
     air = Air()
     core = ClientCore("ear", "one", 0)
     for now_ns in (0, AGAIN_NS, 2 * AGAIN_NS):
@@ -203,7 +203,7 @@ def decode_join(message: Publish) -> Join:
         ("ear", "pool", "world pool, this is table"),
     ],
 )
-def test_who_is_refused_is_told_why_and_asks_no_more(name: str, world: str, reason: str) -> None:
+def test_a_refused_client_has_the_reason_and_sends_no_further_hello(name: str, world: str, reason: str) -> None:
     air = Air()
     core = ClientCore(name, "one", 0, world)
     air.carry(core)

@@ -288,7 +288,7 @@ def test_a_player_that_is_lost_while_it_does_not_exist_holds_nothing_and_comes_b
     assert (times[120] - times[75] > 1_000_000_000) is (back_ms > 1000)
 
 
-def test_in_realtime_a_run_that_goes_on_without_such_a_player_is_the_same() -> None:
+def test_in_realtime_a_run_that_continues_without_such_a_player_is_the_same() -> None:
     """It leaves after `client_back`, and joins again before its robot is added: to nobody was it away."""
     states: list[System] = []
 

@@ -115,7 +115,7 @@ FAULTS = st.one_of(st.just(lose_supervisor), st.builds(lose_hub, st.sampled_from
 
 
 @pytest.mark.parametrize("fault", [lose_supervisor, lose_hub("now")], ids=["supervisor", "vhub"])
-def test_who_is_lost_as_it_is_asked_does_not_change_what_happens(fault: Fault) -> None:
+def test_a_process_lost_at_a_request_changes_no_event(fault: Fault) -> None:
     assert_same([(tick, fault) for tick in (21, 52, 71, 101)])
 
 
@@ -125,7 +125,7 @@ def test_losses_at_any_tick_change_nothing(faults: Sequence[tuple[int, Fault]], 
     assert_same(faults, nodes)
 
 
-def test_a_re_simulation_has_what_was_asked_for(tmp_path: Path) -> None:
+def test_a_re_simulation_has_the_requested_events(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     fly(asking([], []), capture=path)
     assert verify_capture(path, nodes=3).equal

@@ -145,7 +145,7 @@ def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_late
 @pytest.mark.parametrize(
     ("pace", "line"), [("fast", 0), ("fast", 1), ("realtime", 0), ("realtime", 1), ("realtime", 2), ("realtime", -1)]
 )
-def test_a_line_of_the_account_outlives_the_vhub_that_was_to_tell_it(tmp_path: Path, pace: str, line: int) -> None:
+def test_a_line_of_the_account_outlives_the_vhub_that_was_to_report_it(tmp_path: Path, pace: str, line: int) -> None:
     """The vHub dies at the record of an absence, when that is written and nothing is said of it; or (-1), of the tick
     at which a player leaves, when the record of the tick alone is written."""
 

@@ -155,7 +155,7 @@ def test_a_supervisor_that_was_started_again_ends_it_too(hub: int, supervisor: i
     assert fold(state.deployment, cut.system.journal).end is None and not cut.system.hub.finished
 
 
-def test_a_supervisor_that_alone_has_lost_its_machine_goes_on_from_the_vhubs_commit() -> None:
+def test_a_supervisor_that_alone_has_lost_its_machine_continues_from_the_vhubs_commit() -> None:
     """What was ordered up to there is not ordered again."""
 
     def add(system: System) -> None:

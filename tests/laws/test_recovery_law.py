@@ -148,7 +148,7 @@ def test_an_epoch_without_a_node_is_no_answer_to_its_ready() -> None:
 
 
 @pytest.mark.parametrize("sets", ["nodes.n2.required=true", "on_node_loss=stop"])
-def test_where_the_deployment_says_so_the_run_ends(sets: str) -> None:
+def test_a_lost_node_ends_the_run_where_the_deployment_requires_it(sets: str) -> None:
     run = disturbed([(100, kill("n2"))], sets=(*PURE, sets))
     assert run.json["failed"] and run.json["reason"] == "lost n2: its connection closed"
     assert run.digests == undisturbed().digests[: len(run.digests)] and 100 <= run.json["ticks"] <= 105

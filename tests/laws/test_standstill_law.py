@@ -83,7 +83,7 @@ def lose_clients(system: System) -> None:
 
 
 @pytest.mark.parametrize("pace", [FAST, REALTIME], ids=str)
-def test_a_supervisor_whose_machine_slept_blames_nobody(pace: Pace) -> None:
+def test_a_supervisor_whose_machine_slept_loses_no_process(pace: Pace) -> None:
     """It wakes, and has heard nobody for ten seconds."""
     said: list[str] = []
     run = fly(lambda system: system.set_forward(SUPERVISOR, 10_000 * MS), pace, on_log=lambda *say: said.append(say[2]))

@@ -196,7 +196,7 @@ def test_keys_play_and_the_terminal_gets_its_mode_back() -> None:
     assert termios.tcgetattr(terminal.file) == terminal.mode
 
 
-def test_without_a_terminal_the_message_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_terminal_the_message_names_the_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     with open(os.devnull, encoding="utf-8") as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(BadValue, match="the keyboard needs a terminal: declare the player with `launch: manual`"):

@@ -64,7 +64,7 @@ def figures(line: str) -> list[float]:
 
 @pytest.mark.parametrize("name", ["red", "blue"])
 @pytest.mark.parametrize("y", [-0.25, -0.1, 0.0, 0.2])
-def test_the_keeper_stands_between_ball_and_goal(name: str, y: float) -> None:
+def test_the_keeper_is_between_ball_and_goal(name: str, y: float) -> None:
     bench = Bench(name)
     for _ in range(5):
         commands = bench.act(0.0, y)
@@ -212,7 +212,7 @@ def test_a_full_shot_does_not_climb_the_wall() -> None:
     assert RADIUS + up * up / (2 * table.gravity) < table.walls.height
 
 
-def test_a_ball_that_no_figure_can_stand_beside_is_not_struck() -> None:
+def test_a_ball_out_of_reach_of_all_figures_is_not_struck() -> None:
     """One at the side wall, where the goalkeeper's stroke ends before."""
     held = rod("goal", swing=-0.8, slide=LINES["goal"].half_stroke)
     for y, is_struck in ((held.half_stroke, True), (held.half_stroke + 0.05, False)):

@@ -1,4 +1,4 @@
-"""Thirteen truths of the Bullet engine as it is used: loaded anew at every tick, with the numbers of table.yaml.
+"""Twelve truths of the Bullet engine as it is used: loaded anew at every tick, with the numbers of table.yaml.
 
 Each is a formula from a textbook, with the tolerance to which the engine keeps it; its source and what Bullet does with
 other settings is said beside it. Speeds, angles and phases are drawn; a test that fails prints the seed of its draws.
@@ -6,12 +6,7 @@ other settings is said beside it. Speeds, angles and phases are drawn; a test th
 
 from __future__ import annotations
 
-import hashlib
-import os
 import random
-import struct
-import subprocess
-import sys
 from collections.abc import Callable
 from math import atan2, cos, degrees, exp, log, pi, sin, sqrt
 from typing import Any, Final
@@ -342,71 +337,7 @@ def test_a_ball_on_a_strip_rolls_off_the_wall(bullet: Make, draws: random.Random
             assert (abs(one.position[1]) < half - 0.05) == rolls
 
 
-# --- 11: the same again ----------------------------------------------------------------------------------------------
-
-
-def played(one: Any, draws: random.Random, ticks: int) -> None:
-    """Play a ball among rods that are told something else every ten ticks."""
-    motors: dict[str, Any] = {}
-    for tick in range(ticks):
-        if tick % 10 == 0:
-            motors = {
-                name: ((draws.uniform(-3.0, 3.0), 90.0), (draws.uniform(-120.0, 120.0), 2.0))
-                for name in ("red.midfield", "blue.midfield", "red.attack", "blue.attack")
-            }
-        one.tick(motors)
-
-
-def digest_of(one: Any) -> str:
-    return hashlib.blake2b(struct.pack(f"<{len(one.numbers)}d", *one.numbers)).hexdigest()
-
-
-AGAIN: Final = """
-import random
-from tests.physics.conftest import World
-from tests.physics.test_bullet_truths import digest_of, played
-one = World("engine=bullet")
-one.put((0.03, 0.01, 0.0175), (1.0, 0.5, 0.0))
-played(one, random.Random({seed}), 400)
-print(digest_of(one))
-"""
-
-
-def test_the_same_inputs_give_the_same_bits(bullet: Make) -> None:
-    """In another process, in an engine that did something else before, and going on from saved numbers."""
-    first, second = bullet(), bullet()
-    second.put((0.2, 0.2, 0.04), (-9.0, 3.0, 1.0))
-    played(second, random.Random(SEED + 1), 50)
-    for one in (first, second):
-        for name in [*one.layout.names]:
-            if "joint_positions" in one.layout[name].offsets:
-                one.set_rod(name, (0.0, 0.0), (0.0, 0.0))
-        one.numbers[:] = bullet_start(one)
-        one.put((0.03, 0.01, 0.0175), (1.0, 0.5, 0.0))
-    draws = random.Random(SEED)
-    played(first, draws, 200)
-    third = bullet()
-    third.numbers[:] = first.numbers
-    saved = draws.getstate()
-    played(first, draws, 200)
-    draws.setstate(saved)
-    played(third, draws, 200)
-    played(second, random.Random(SEED), 400)
-    assert first.of("ball", "linear_velocity", 3) != [1.0, 0.5, 0.0]
-    environment = {**os.environ, "PYTHONHASHSEED": "7"}
-    other = subprocess.run(
-        [sys.executable, "-c", AGAIN.format(seed=SEED)], capture_output=True, text=True, env=environment, check=True
-    )
-    assert {digest_of(first), digest_of(second), digest_of(third), other.stdout.strip()} == {digest_of(first)}
-
-
-def bullet_start(one: Any) -> list[float]:
-    from foosim.world.assembly.world import initial_numbers
-
-    return initial_numbers(one.deployment, one.layout)
-
-
-# --- 12, 13: symmetry, limits ----------------------------------------------------------------------------------------
+# --- 11, 12: symmetry, limits ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("contact_erp", ERPS)

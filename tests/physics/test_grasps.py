@@ -126,7 +126,7 @@ def test_it_slips_by_less_than_a_millimetre_in_half_a_minute_of_motion() -> None
         assert worst < SLIP_M_MAX and not made.quarantined
 
 
-def test_it_pushes_what_stands_in_its_way() -> None:
+def test_it_pushes_a_crate_in_its_way() -> None:
     with at_crate({"crate": crate(1.0), "other": crate(1.3, mass=1.0)}) as made:
         made.step({"a": {"gripper": (1.0,)}})
         made.step({"a": {"joints": (0.05, AT_IT[1])}}, ticks=100)
@@ -278,7 +278,7 @@ def test_what_a_holder_in_quarantine_held_falls() -> None:
         ({"at": {"link": "grip", "y": "12 cm"}, "reach": "5 cm"}, ""),
     ],
 )
-def test_what_fits_is_taken_and_a_job_says_why_another_is_not(gripper: dict[str, Any], why: str) -> None:
+def test_an_object_that_fits_is_taken_and_a_failed_job_has_the_reason(gripper: dict[str, Any], why: str) -> None:
     with at_crate({"crate": crate(1.0, tags=["crate"])}, **gripper) as made:
         jobs = Jobs(made.declared, "script", "a", "gripper")
         jobs.hear(made.readings)

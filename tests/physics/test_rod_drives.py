@@ -177,7 +177,7 @@ def test_a_motor_near_the_ball_does_the_same(driven: Make, engine: str) -> None:
 
 @engines
 @pytest.mark.parametrize("ticks", [0, 1, 3])
-def test_a_dead_time_is_so_many_ticks(driven: Make, engine: str, ticks: int) -> None:
+def test_a_dead_time_is_a_number_of_ticks(driven: Make, engine: str, ticks: int) -> None:
     modifiers = f", modifiers: [{{kind: delay, time: {2 * ticks} ms}}]"
     one = driven(engine, f"{{kind: rod_voltage{modifiers}}}", STILL)
     one.step(ticks=2)

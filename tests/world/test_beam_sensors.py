@@ -79,7 +79,7 @@ def test_a_mount_is_turned_and_its_beams_are_in_its_plane(fleet_text: Text) -> N
     assert tilted.read() == pytest.approx([above / sin(pi / 4)])
 
 
-def test_a_scan_of_a_full_turn_begins_behind_and_repeats_nothing(fleet_text: Text) -> None:
+def test_a_scan_of_a_full_turn_begins_at_the_rear_and_repeats_no_ray(fleet_text: Text) -> None:
     robot = Robot(fleet_text, "kind: laser_scanner, rays: 4, angle: 360 deg, range: 100 m, at: {z: 20 cm}")
     behind, right, ahead, left = 22.0, 11.5, 18.0, 13.5
     assert robot.read() == pytest.approx([behind, right, ahead, left])
@@ -173,7 +173,7 @@ def test_many_sensors_together_have_the_bits_of_each_alone(fleet_text: Text) -> 
     assert met > 20
 
 
-def test_forms_ask_their_surroundings_for_rays_and_clearance_at_the_start_of_the_tick(fleet_text: Text) -> None:
+def test_surroundings_give_rays_and_clearance_at_the_start_of_the_tick(fleet_text: Text) -> None:
     """All of a layout share one caster."""
     robot = Robot(fleet_text, "kind: range, range: 1 m", robots=2)
     robot.set("rover02", (4.0, -1.0, 0.0))

@@ -10,10 +10,8 @@ import pytest
 
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.processes import processes_of
 from foosim.library.mobile.hall_obstacles import obstacles_of, start_findings
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
 from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits
 from foosim.world.forms.registry import names
@@ -91,13 +89,13 @@ def test_what_does_not_fit_is_refused_with_its_place(
          "robots.base.x: the station stands in scenery.pallet, '-17.5 m, 0 m'"),
     ],
 )  # fmt: skip
-def test_who_stands_in_something_or_outside_is_refused(
+def test_a_robot_in_an_obstacle_or_outside_is_refused(
     fleet_text: Callable[..., str], sets: list[str], problem: str
 ) -> None:
     assert problems(fleet_text(2), *sets)[0] == problem
 
 
-def test_stations_do_not_stand_in_one_another() -> None:
+def test_stations_do_not_overlap() -> None:
     second = DEPLOYMENT.robots["base"].model_copy(update={"x": -17.2})
     deployment = DEPLOYMENT.model_copy(update={"robots": {**DEPLOYMENT.robots, "second": second}})
     assert [(finding.location[1], finding.what) for finding in start_findings(deployment)] == [
@@ -140,18 +138,6 @@ def test_rovers_start_where_they_are_declared() -> None:
     assert frame.at("rover03", "heading") == pytest.approx(-pi / 2)
     assert frame.vector("rover03", "orientation", 4) == pytest.approx([0.0, 0.0, -(0.5**0.5), 0.5**0.5])
     assert frame.at("rover03", "charge") == pytest.approx(0.95 * 250 * 3600)
-
-
-def test_each_rover_is_an_island_that_its_owner_solves() -> None:
-    layout, owners = build_layout(DEPLOYMENT), DEPLOYMENT.owners()
-    assignment = Assignment(layout, table_reach_of(DEPLOYMENT, layout), ["east", "west"], owners)
-    shares = assignment.shares(initial_numbers(DEPLOYMENT, layout))
-    for node, share in shares.items():
-        mine = [entity for entity in layout.entities if owners[entity.name] == node]
-        assert share.islands == tuple(
-            (entity.index,) for entity in mine if entity.model == "rover" and entity.name not in layout.spares
-        )
-        assert share.solved == tuple(entity.index for entity in mine)
 
 
 def test_the_scene_has_rovers_where_they_are_and_their_antennas() -> None:
@@ -197,13 +183,7 @@ def test_a_circle_is_clear_of_a_rectangle_from_where_it_touches(x: float, y: flo
         assert turned.is_clear(-side_y * y, side_x * x, 0.5) is clear
 
 
-def test_players_that_name_a_process_share_it(fleet_text: Callable[..., str]) -> None:
-    deployment = load_deployment(fleet_text(2, "players.pilot02.process=own"), "hall.yaml")
-    found = {name: process.roles for name, process in processes_of(deployment).items()}
-    assert found["fleet-west"] == ("dispatch", "pilot01") and found["own"] == ("pilot02",)
-
-
-def test_nobody_is_added_or_put_outside_of_the_hall() -> None:
+def test_no_robot_is_added_or_put_outside_of_the_hall() -> None:
     layout = build_layout(DEPLOYMENT)
     numbers = initial_numbers(DEPLOYMENT, layout)
     with pytest.raises(BadValue, match=r"beyond the bounds of the world: rover21 would .* '9999 m, 0 m, "):

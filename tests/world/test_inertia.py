@@ -62,7 +62,7 @@ def test_a_diagonal_tensor_has_its_own_moments_unturned() -> None:
     assert principal_of((2.0, 0.0, 0.0, 2.0, 0.0, 2.0)) == ((2.0, 2.0, 2.0), UPRIGHT)
 
 
-def test_equal_moments_with_products_of_inertia_are_told_apart() -> None:
+def test_equal_moments_with_products_of_inertia_are_distinguished() -> None:
     moments, axes = principal_of((2.0, 1.0, 0.0, 2.0, 0.0, 4.0))
     assert sorted(moments) == pytest.approx([1.0, 3.0, 4.0])
     assert np.allclose(turned((moments[0], 0.0, 0.0, moments[1], 0.0, moments[2]), axes), (2, 1, 0, 2, 0, 4))

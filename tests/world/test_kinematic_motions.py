@@ -236,7 +236,7 @@ def test_a_zone_counts_who_is_in_it(shape: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("kind", ["v_w", "wheel_speeds"])
-def test_drives_that_are_asked_together_have_the_bits_of_each_alone(kind: str) -> None:
+def test_drives_computed_together_have_the_bits_of_each_alone(kind: str) -> None:
     """Whichever of the robots there are, in whatever order."""
     robot = {"model": "differential_drive", "actuators": {"motion": {"kind": kind}}}
     robots = {
@@ -256,7 +256,7 @@ def test_drives_that_are_asked_together_have_the_bits_of_each_alone(kind: str) -
     assert at_limit > 3 or kind == "wheel_speeds"
 
 
-def test_a_class_with_a_command_of_its_own_is_not_asked_by_what_it_inherits() -> None:
+def test_a_class_with_a_command_of_its_own_is_not_computed_by_its_base() -> None:
     """`together` computes what `command` of its own class does."""
 
     class Base:

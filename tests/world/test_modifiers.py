@@ -189,9 +189,7 @@ def test_modifiers_work_in_their_order_and_one_of_a_kind_is_not_the_other() -> N
     assert len({*first} & {*both}) == 0
 
 
-def test_a_reading_that_is_not_finite_is_said_once_and_not_sent(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_non_finite_reading_is_counted_and_not_sent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written(
         folder_on_path(tmp_path, monkeypatch),
         "class Failing(Sensor):",

@@ -125,7 +125,7 @@ def test_fields_of_several_numbers_are_of_one_length() -> None:
         (np.array([inf, -inf]).tobytes(), "encoder with non-finite numbers"),
     ],
 )
-def test_what_does_not_fit_says_why(payload: bytes, text: str) -> None:
+def test_a_payload_of_another_size_or_kind_is_malformed(payload: bytes, text: str) -> None:
     with pytest.raises(Malformed) as error:
         codec("encoder").decode(payload)
     assert str(error.value) == text
@@ -151,7 +151,7 @@ def test_the_codec_of_each_channel() -> None:
         ("camera", "bal", "camera has no such channel (there are: ball, echo), 'bal', nearest is 'ball'"),
     ],
 )
-def test_an_unknown_channel_names_those_that_exist(robot: str, channel: str, text: str) -> None:
+def test_an_unknown_channel_is_refused_with_the_channels(robot: str, channel: str, text: str) -> None:
     with pytest.raises(UnknownName) as error:
         channel_codec(DEPLOYMENT, robot, channel)
     assert str(error.value) == text
@@ -216,7 +216,7 @@ def test_a_command_goes_to_the_node_as_it_is_however_it_is_written(slide: float,
         (None, "not numbers by name or in their order, null"),
     ],
 )
-def test_names_and_numbers_that_are_none_of_a_command_name_its_fields(command: Any, text: str) -> None:
+def test_wrong_names_and_counts_of_a_command_are_refused_with_its_fields(command: Any, text: str) -> None:
     with pytest.raises(BadValue) as error:
         ENCODER.encode("red.goal", command)
     assert str(error.value) == f"{TAKES}: {text}"
@@ -323,14 +323,14 @@ def test_positions_at_times_come_back_however_they_are_written(
         (([1.0],), "1 number given"),
     ],
 )
-def test_what_are_no_positions_at_times_says_why(planned: CommandEncoder, command: Any, text: str) -> None:
+def test_invalid_positions_at_times_are_refused(planned: CommandEncoder, command: Any, text: str) -> None:
     with pytest.raises(BadValue) as error:
         planned.encode("arm", {"go": command})
     assert str(error.value).startswith(f"arm/go takes times (s), positions (m or rad): {text}")
 
 
 @pytest.mark.parametrize("robot", ["camera", "ball", "red.gaol"])
-def test_what_has_no_such_actuator_takes_no_command(robot: str) -> None:
+def test_an_entity_without_the_actuator_takes_no_command(robot: str) -> None:
     with pytest.raises(
         UnknownName, match=r"no robot that takes a Command \(there are: blue\.attack, .*red\.midfield\)"
     ):

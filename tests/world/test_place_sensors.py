@@ -129,7 +129,7 @@ def test_a_receiver_goes_north_and_east_as_the_radii_of_curvature_say() -> None:
 # --- joints and touches ----------------------------------------------------------------------------------------------
 
 
-def test_joints_are_those_of_the_robot_or_those_that_are_named() -> None:
+def test_joints_are_all_or_the_named_ones() -> None:
     every, spin = (on_rod(f"{{kind: joint_state, rate: 100 Hz{more}}}") for more in ("", ", joints: [spin]"))
     swapped = on_rod("{kind: joint_state, rate: 100 Hz, joints: [spin, slide]}")
     for reader in (every, spin, swapped):
@@ -149,7 +149,7 @@ def test_modifiers_know_how_many_joints_there_are() -> None:
     assert reader.read(0) == (5.0, 6.0, 0.0, 0.0, 1.0, 0.5)
 
 
-def test_a_touch_speaks_between_the_times_of_the_rate() -> None:
+def test_a_touch_sends_between_the_times_of_the_rate() -> None:
     reader = on_rod("{kind: contact, rate: 10 Hz}")
     assert reader.sensor.is_due(50, reader.numbers) and not reader.sensor.is_due(51, reader.numbers)
     assert reader.read(0) == (0.0, 0.0, -1.0)

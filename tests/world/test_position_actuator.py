@@ -66,7 +66,7 @@ OUT_OF_REACH: Final[dict[str, bytes]] = {
 
 
 @pytest.mark.parametrize("what", MALFORMED)
-def test_what_is_no_command_is_refused_counted_and_changes_nothing(what: str) -> None:
+def test_a_malformed_command_is_refused_counted_and_changes_nothing(what: str) -> None:
     """The codec refuses what is none, before the actuator sees it."""
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     assert takes(Command(0.05, 1.0), numbers) and wanted(numbers) == (0.05, 1.0)

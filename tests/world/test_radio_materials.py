@@ -70,7 +70,7 @@ def test_a_setting_takes_what_a_file_takes() -> None:
         ("[wood]", "radio: not a mapping, a list of 1"),
     ],
 )  # fmt: skip
-def test_what_is_no_material_is_refused_with_its_place(radio: str, problem: str) -> None:
+def test_an_invalid_material_is_refused_with_its_place(radio: str, problem: str) -> None:
     text = with_radio(radio)
     with pytest.raises(DeploymentError) as refusal:
         load_deployment(text, "t")

@@ -143,7 +143,7 @@ def test_a_model_has_the_fields_that_foosim_needs(site: Path, about: str, fields
     assert [*find_model("own_form:Own").fields_of(None, None)] == fields
 
 
-def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
+def test_a_model_is_the_variant_of_its_settings(site: Path) -> None:
     settings = ("class Moved(RobotSettings):", "    dynamics: str = 'none'", "")
     about = "slots={'x': 1}, variants={'rigid': {'is_rigid': True, 'slots': {'y': 2}}}"
     written(site, *settings, f"model('own', Moved, {about})(Own)")
@@ -179,7 +179,7 @@ print(json.dumps([find("sensor", "encoder").module, find("sensor", "own").module
     assert told.startswith("cannot be imported: RuntimeError: at import (own_broken.py:")
 
 
-def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) -> None:
+def test_an_import_error_of_a_package_is_in_the_message_of_each_type(site: Path) -> None:
     """A model, kit or engine that is unknown may be in it."""
     written(site, "raise RuntimeError('at import')")
     install(site, "worn", "0.3", "own_form")

@@ -188,7 +188,7 @@ def printed(code: str, folder: Path | None = None) -> Any:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_each_stands_in_a_module_of_its_name_and_says_what_it_is(form: str) -> None:
+def test_each_is_in_a_module_of_its_name_and_has_a_summary(form: str) -> None:
     for name in names(form):
         component = find(form, name)
         assert (component.type_name, component.name, component.module.rpartition(".")[2]) == (form, name, name)
@@ -219,7 +219,7 @@ print(json.dumps([found, modules, "numpy" in sys.modules]))
         ("actuator", "wheel_speed", ", nearest is 'wheel_speeds'"),
     ],
 )
-def test_an_unknown_name_says_what_there_is_and_the_nearest(form: str, kind: str, nearest: str) -> None:
+def test_an_unknown_name_is_refused_with_the_names_and_the_nearest(form: str, kind: str, nearest: str) -> None:
     with pytest.raises(UnknownName) as error:
         find(form, kind)
     there = ", ".join(names(form))
@@ -263,7 +263,7 @@ REFUSED: Final = {
 
 @pytest.mark.usefixtures("site")
 @pytest.mark.parametrize("path", REFUSED)
-def test_a_path_that_leads_to_no_component_says_why(path: str) -> None:
+def test_a_path_without_a_component_is_refused_with_the_reason(path: str) -> None:
     try:
         with pytest.raises(BadValue) as error:
             find("sensor", path)
@@ -273,7 +273,7 @@ def test_a_path_that_leads_to_no_component_says_why(path: str) -> None:
 
 
 @pytest.mark.usefixtures("site")
-def test_a_missing_class_names_those_that_there_are() -> None:
+def test_a_missing_class_is_refused_with_the_nearest() -> None:
     with pytest.raises(
         BadValue,
         match=r"there is no ReachGuage in own_gauges .*'own_gauges:ReachGuage', nearest is 'own_gauges:ReachGauge'",
@@ -309,7 +309,7 @@ def test_a_name_of_foosims_own_is_not_taken_whichever_comes_first(site: Path, fi
     assert printed('print(json.dumps(said("sensor", "encoder")))', site) == "foosim.library.table.encoder"
 
 
-def test_a_package_that_takes_a_name_of_foosims_own_hurts_nobody_else(site: Path) -> None:
+def test_a_package_that_takes_a_name_of_foosim_changes_no_other_component(site: Path) -> None:
     (site / "own_thief.py").write_text(THIEF)
     install(site, "thief", "1.2", "own_thief")
     code = """

@@ -213,7 +213,7 @@ def test_a_quarantined_ball_comes_back_and_is_free_again() -> None:
     assert field(numbers, "quarantined") == [0.0] and is_reset(numbers)
 
 
-def test_a_reset_leaves_no_memory_behind() -> None:
+def test_a_reset_leaves_no_memory() -> None:
     numbers = apply(in_play((0.4, 0.2, RADIUS), (0.0, 0.0, 0.0)), 700)
     numbers[BALL.offsets["contacts"]] = 3.0
     numbers[BALL.offsets["position"] : BALL.offsets["position"] + 3] = [LINE_X + 0.01, 0.0, RADIUS]
@@ -361,7 +361,7 @@ def test_a_dead_ball_comes_back_between_the_lines_where_it_lay(
     assert abs(vx) == TABLE.rules.kickoff_speed and vx * back[0] <= 0.0, "away from the nearer goal"
 
 
-def test_places_between_lines_are_those_that_no_figure_reaches() -> None:
+def test_places_between_lines_are_out_of_reach_of_figures() -> None:
     assert [x for x, _ in places_between_lines(TABLE)] == pytest.approx(MIDDLES)
     close = table_of(deployed("table.ball.radius=30 mm"))
     assert len(places_between_lines(close)) == 0
@@ -457,7 +457,7 @@ def test_without_a_match_play_has_no_end() -> None:
     assert not told(apply(numbers, deployment=endless), endless)["is_over"]
 
 
-def test_marks_tell_own_goals_and_the_end_to_the_tick() -> None:
+def test_marks_have_own_goals_and_the_end_to_the_tick() -> None:
     short = with_rules("match={goals: 1}")
     numbers = in_play((-TABLE.lines["goal"].x, 0.0, RADIUS))
     touch(numbers, {"blue.goal": 3.0})

@@ -40,7 +40,7 @@ def test_rotations_compose() -> None:
     assert rotate(turn((0.0, 1.0, 0.0), pi / 2), (0.0, 0.0, -1.0)) == pytest.approx((-1.0, 0.0, 0.0))
 
 
-def test_red_stands_at_negative_x_and_blue_is_mirrored() -> None:
+def test_red_is_at_negative_x_and_blue_is_mirrored() -> None:
     for line in ("goal", "defence", "midfield", "attack"):
         red, blue = SCENE.bodies[f"red.{line}"], SCENE.bodies[f"blue.{line}"]
         assert red.position[0] == TABLE.lines[line].x == -blue.position[0]

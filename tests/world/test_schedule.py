@@ -33,9 +33,7 @@ def drawn(tick_ns: int, rate: Fraction, share: float) -> tuple[Timed, Schedule]:
 
 
 @given(TICKS_NS, RATES, st.floats(0, 1), st.integers(0, 1 << 50))
-def test_a_tick_is_due_where_the_rational_numbers_say_so(
-    tick_ns: int, rate: Fraction, share: float, first: int
-) -> None:
+def test_a_tick_is_due_by_the_rational_inequality(tick_ns: int, rate: Fraction, share: float, first: int) -> None:
     timed, schedule = drawn(tick_ns, rate, share)
     per_ns = rate / NS_PER_S
     for tick in range(first, first + 50):

@@ -93,7 +93,7 @@ def test_a_file_that_changed_since_it_was_pinned_is_refused(folder: Path) -> Non
             load_deployment(text, NAME).with_assets({other: files[other] for other in files if other != path})
 
 
-def test_another_file_than_before_leaves_no_digest_behind(folder: Path) -> None:
+def test_another_file_leaves_no_digest_of_the_first(folder: Path) -> None:
     text, _ = pin_assets(text_with(*ROBOTS), NAME, folder)
     again, files = pin_assets(
         with_owners(text, NAME, {"n1": ["*"]}, ["robots.cart.file=models/arm.urdf"]), NAME, folder
