@@ -15,9 +15,12 @@ from multiprocessing import get_context
 from typing import Final
 
 from tests.deployed import TABLE, TEXT
-from tests.gate.mutants import MUTANTS
+from tests.gate import node, supervisor, vhub
+from tests.gate.planting import Mutant
 from tests.swarm.campaign import fly
 
+MUTANTS: Final[tuple[Mutant, ...]] = (*node.MUTANTS, *supervisor.MUTANTS, *vhub.MUTANTS)
+"""Bugs planted in the cores, one rule switched off each: to add one, a function in `node`, `supervisor` or `vhub`."""
 SEEDS: Final = 1000
 
 
