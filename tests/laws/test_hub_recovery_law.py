@@ -21,9 +21,9 @@ from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
 from foosim.vhub.core import HubCore
-from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing
 from tests.deployed import DEPLOYMENT, TABLE, TEXT
+from tests.frames import rows_of
 
 TICKS: Final = 240
 MS: Final = 1_000_000
@@ -63,17 +63,8 @@ class Seen:
                 self.told.setdefault(traced.process, {}).setdefault(message.number, set()).add(traced.payload)
 
     def rows(self) -> list[Any]:
-        """The rows of all closings in their order, without the wall's time and who was lost."""
-        rows: list[Any] = []
-        known = None
-        plan = plan_of(DEPLOYMENT)
-        for closing in self.closings:
-            for topic, at_ns, _, number, row in (*world_rows(closing, plan, known), *map(packet_entry, closing.fates)):
-                fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
-                if topic != RECOVERIES:
-                    rows.append((topic, at_ns, number, fields))
-            known = closing.frame
-        return rows
+        """The rows of all closings in their order, without the wall's time and losses."""
+        return rows_of(self.closings, DEPLOYMENT, RECOVERIES)
 
 
 def fly(faults: Sequence[Fault], ticks: int = TICKS, sets: Sequence[str] = SETS, **chosen: Any) -> Seen:

@@ -17,17 +17,16 @@ from foosim.simulation.journals import ENDINGS, Ending
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
-from foosim.vhub.recording.rows_of_closing import packet_entry, plan_of, world_rows
 from foosim.vhub.state.records import Closing
 from foosim.world.edits import Disrupt
 from tests.deployed import DEPLOYMENT, TABLE, TEXT
+from tests.frames import rows_of
 
 TICKS: Final = 160
 SETS: Final = (
     *("engine=pure", "table.rules.kickoff_delay=20 ms"),
     "network.links=[{id: lan, between: ['*', '*'], delay: 1 ms, jitter: {shape: gamma, sd: 2 ms}, loss: 2 %}]",
 )
-PLAN: Final = plan_of(DEPLOYMENT)
 EVENTS: Final[Sequence[tuple[int, dict[str, Any]]]] = (
     (20, {"partition": [["player-red"], ["rest"]], "for": "20 ms"}),
     (40, {"clog": {"from": "camera", "to": "player-*"}}),
@@ -51,19 +50,6 @@ def lose_supervisor(system: System) -> None:
         system.later(5_000_000, lambda: system.start("supervisor"))
 
 
-def rows_in(closings: Sequence[Closing]) -> list[Any]:
-    """The rows of all closings without the wall's time, who computed and who was lost."""
-    rows: list[Any] = []
-    known = None
-    for closing in closings:
-        for topic, at_ns, _, number, row in (*world_rows(closing, PLAN, known), *map(packet_entry, closing.fates)):
-            fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
-            if topic not in (RECOVERIES, EPOCHS):
-                rows.append((topic, at_ns, number, fields))
-        known = closing.frame
-    return rows
-
-
 def fly(
     prepare: Callable[[System], None], nodes: int = 2, capture: Path | None = None
 ) -> tuple[list[Any], dict[str, Any]]:
@@ -74,7 +60,8 @@ def fly(
     run = rehearse(text, TABLE.name, TICKS, nodes, SETS, told, prepare=prepare, capture=capture)
     assert run.json["reason"] == "done"
     assert all(answer.accepted for answer in run.answers.values()), run.answers
-    return rows_in(closings), {identity: answer.tick for identity, answer in run.answers.items()}
+    ticks = {identity: answer.tick for identity, answer in run.answers.items()}
+    return rows_of(closings, DEPLOYMENT, RECOVERIES, EPOCHS), ticks
 
 
 def asking(faults: Sequence[tuple[int, Fault]], asked: list[str]) -> Callable[[System], None]:
