@@ -63,7 +63,7 @@ class Yard:
             robots = [robot for robot in self.layout.robots if robot.is_solved]
             self.solve(robots, self.numbers, self.stepper)
             self.tick += 1
-        assert self.stepper.quarantined == []
+        assert not self.stepper.quarantined, self.stepper.quarantined
 
     def solve(self, robots: Sequence[Entity], numbers: list[float], stepper: Stepper) -> None:
         islands = tuple((robot,) for robot in robots)
@@ -79,7 +79,7 @@ class Together(Yard):
         for _ in range(ticks):
             self.stepper.solve(self.engine, Work(self.tick, self.layout, (everybody,), solved, self.numbers, {}))
             self.tick += 1
-        assert self.stepper.quarantined == []
+        assert not self.stepper.quarantined, self.stepper.quarantined
 
 
 def drawn(name: str, tick: int, bounds: Sequence[float]) -> list[float]:
