@@ -1,4 +1,4 @@
-"""A world of robots that move by kinematics, stepped by hand."""
+"""A world of robots that move by kinematics, or of rigid bodies, stepped by hand."""
 
 from __future__ import annotations
 
@@ -63,11 +63,23 @@ class Yard:
             robots = [robot for robot in self.layout.robots if robot.is_solved]
             self.solve(robots, self.numbers, self.stepper)
             self.tick += 1
-        assert self.stepper.quarantined == []
+        assert not self.stepper.quarantined, self.stepper.quarantined
 
     def solve(self, robots: Sequence[Entity], numbers: list[float], stepper: Stepper) -> None:
         islands = tuple((robot,) for robot in robots)
         stepper.solve(self.engine, Work(self.tick, self.layout, islands, tuple(r.index for r in robots), numbers, {}))
+
+
+class Together(Yard):
+    """All bodies as one island."""
+
+    def step(self, ticks: int = 1) -> None:
+        everybody = tuple(self.layout.entities)
+        solved = tuple(entity.index for entity in everybody)
+        for _ in range(ticks):
+            self.stepper.solve(self.engine, Work(self.tick, self.layout, (everybody,), solved, self.numbers, {}))
+            self.tick += 1
+        assert not self.stepper.quarantined, self.stepper.quarantined
 
 
 def drawn(name: str, tick: int, bounds: Sequence[float]) -> list[float]:

@@ -1,12 +1,15 @@
-"""Modules with forms of somebody's own, as tests write them, and what is said of deployments that name these."""
+"""Modules with components of other packages, as tests write them, and the problems of deployments that name these."""
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import subprocess
 import sys
 from importlib import invalidate_caches
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -15,8 +18,8 @@ from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
 from foosim.world.assembly import used_forms
 from foosim.world.forms import registry
+from tests.deployed import TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 HEAD: Final = """
 from typing import Annotated
 
@@ -103,10 +106,30 @@ def written(folder: Path, *lines: str, name: str = "own_form") -> Path:
     return path
 
 
+def install(folder: Path, name: str, version: str, *modules: str) -> None:
+    """Leave in a folder what pip leaves there of a package whose entry points are modules in the folder."""
+    about = folder / f"{name}-{version}.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    entries = "\n".join(f"{module.removeprefix('own_')} = {module}" for module in modules)
+    (about / "entry_points.txt").write_text(f"[foosim.world]\n{entries}\n")
+    registry._entry_points.cache_clear()
+
+
+def fresh(code: str, folder: Path | None = None) -> Any:
+    """Return what a new process, with a folder on its path, prints as JSON."""
+    path = {} if folder is None else {"PYTHONPATH": str(folder)}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **path})
+    assert done.returncode == 0, done.stderr
+    assert done.stdout, "it ended without a word"
+    return json.loads(done.stdout)
+
+
 def problems(*sets: str, text: str = "") -> list[str]:
     """Return what is said of a deployment, the table if no other, with settings: without places in the text."""
     try:
-        apply_sets(text or TABLE.read_text(), TABLE.name, sets)
+        apply_sets(text or TEXT, TABLE.name, sets)
     except DeploymentError as error:
         return [re.sub(r"^\S+:\d+:\d+: ", "", problem) for problem in error.problems]
     return []

@@ -155,19 +155,6 @@ def test_it_holds_every_module(installed: Installed, tmp_path: Path) -> None:
     assert "Usage" in run(installed.commands / "foosim", "--help", cwd=tmp_path)
 
 
-def test_the_guides_sensor_works_from_an_empty_folder(installed: Installed, tmp_path: Path) -> None:
-    """With foosim as pip installs it, and a file as the guide has it."""
-    guide = (ROOT / "docs" / "how-to" / "write_a_sensor.md").read_text()
-    (source,) = re.findall(r"```python\n# powers\.py\n(.*?)```", guide, re.DOTALL)
-    (setting,) = re.findall(r"--set '(.*powers:MotorPower.*)'\n", guide)
-    (tmp_path / "powers.py").write_text(source)
-    shutil.copy(ROOT / "deploy" / "table.yaml", tmp_path)
-    options = ["--in", "table.yaml", "--ticks", "40", "--set", "engine=pure", "--set", "players={}", "--set", setting]
-    command = installed.commands / "foosim"
-    shown = run(command, "check-component", "motor_power", *options, cwd=tmp_path, PYTHONPATH=str(tmp_path))
-    assert "sensor motor_power: the same world on 1, 2 and 3 nodes" in shown
-
-
 @pytest.mark.parametrize(
     ("names", "shows"),
     [

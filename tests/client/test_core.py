@@ -22,6 +22,7 @@ from foosim.protocol.channels import CLIENT_READS, Plane
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import (
     Build,
+    ClientHello,
     ClientWelcome,
     Commit,
     Deliveries,
@@ -153,7 +154,7 @@ def in_run(name: str = "ear", period: int = 0) -> ClientCore:
 # --- letting in ------------------------------------------------------------------------------------------------------
 
 
-def test_hello_is_said_until_it_is_answered_and_join_until_something_new_has_come() -> None:
+def test_hello_is_repeated_until_the_answer_and_join_until_the_next_downlink() -> None:
     air = Air()
     core = ClientCore("ear", "one", 0)
     for now_ns in (0, AGAIN_NS, 2 * AGAIN_NS):
@@ -200,7 +201,7 @@ def decode_join(message: Publish) -> Join:
         ("ear", "pool", "world pool, this is table"),
     ],
 )
-def test_who_is_refused_is_told_why_and_asks_no_more(name: str, world: str, reason: str) -> None:
+def test_a_refused_client_has_the_reason_and_sends_no_further_hello(name: str, world: str, reason: str) -> None:
     air = Air()
     core = ClientCore(name, "one", 0, world)
     air.carry(core)
@@ -280,6 +281,20 @@ def test_downlinks_in_another_order_are_all_taken_and_once_each() -> None:
     assert [packet.sequence for packet in core.arrivals] == [1, 4, 2, 3]
     assert (core.statistics().missing, core.statistics().repeated, core.statistics().downlinks) == (0, 3, 4)
     assert core.tick == 4, "the newest tick stays"
+
+
+@pytest.mark.parametrize(("numbers", "received"), [((), 0), ((1, 2), 2), ((1, 2, 4, 5), 2), ((1, 3, 2), 3)])
+def test_a_hello_to_a_vhub_that_is_back_names_the_last_downlink_without_a_gap(
+    numbers: tuple[int, ...], received: int
+) -> None:
+    """The vHub sends those above it again, and no other."""
+    core = in_run()
+    taken(core, *[down(number) for number in numbers])
+    published(core)
+    core.hub_gone(0)
+    core.wake(0)
+    (hello,) = [decode(ClientHello, one.payload) for one in published(core) if one.channel is channels.CLIENT_HELLO]
+    assert hello.received == received
 
 
 def test_what_is_not_taken_in_time_is_counted() -> None:

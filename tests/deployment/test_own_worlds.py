@@ -20,8 +20,9 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.simulation.run import rehearse
 from foosim.world.forms import registry
 from foosim.world.layout import build_layout
+from tests.deployed import TABLE
 from tests.kinematic_yard import yard_text
-from tests.own_forms import TABLE, folder_on_path, problems, written
+from tests.own_forms import folder_on_path, problems, written
 
 TEXT: Final = TABLE.read_text()
 WAREHOUSE: Final = (TABLE.parent / "warehouse.yaml").read_text()

@@ -1,7 +1,7 @@
 """Planted bugs that the swarm meets too rarely: a test of the cores finds each of them, directly.
 
 `python -m tests.gate.direct` runs these tests, each in a fork of a process that has collected all of them, with its
-bug planted. To add one: as in `tests.gate.mutants`, with the id of the test that fails with the bug in place of a seed.
+bug planted. To add one: as in `tests.gate.search`, with the id of the test that fails with the bug in place of a seed.
 """
 
 from __future__ import annotations

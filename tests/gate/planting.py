@@ -9,6 +9,9 @@ from typing import Any
 
 from tests.swarm.campaign import undisturbed
 
+Bug = Callable[..., Any]
+"""What is called in place of the function that it gets first."""
+
 
 class Planting:
     """Swaps attributes until it is undone."""
@@ -26,6 +29,20 @@ class Planting:
     def undo(self) -> None:
         """Put everything back, the last first."""
         self._stack.close()
+
+
+def nothing(before: Bug, *given: object) -> None:
+    """Do nothing instead."""
+
+
+def swapping(owner: Any, name: str, bug: Bug) -> Callable[[Planting], None]:
+    """Return what plants a bug in place of one function."""
+
+    def plant(planting: Planting) -> None:
+        before = getattr(owner, name)
+        planting.swap(owner, name, lambda *given, **named: bug(before, *given, **named))
+
+    return plant
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,16 +68,19 @@ class Mutant:
 
 
 class Register:
-    """Collects the mutants of a module: `@register(name, rule, seed)` before each function."""
+    """Collects the mutants of a module: `@register(name, rule, seed, owner, attribute)` before each function.
+
+    The function is called in place of the attribute, which it gets before its arguments. Without an owner it plants the
+    bug itself.
+    """
 
     def __init__(self) -> None:
         self.mutants: list[Mutant] = []
 
-    def __call__(
-        self, name: str, rule: str, seed: int
-    ) -> Callable[[Callable[[Planting], None]], Callable[[Planting], None]]:
-        def note(plant: Callable[[Planting], None]) -> Callable[[Planting], None]:
+    def __call__(self, name: str, rule: str, seed: int, owner: Any = None, attribute: str = "") -> Callable[[Bug], Bug]:
+        def note(bug: Bug) -> Bug:
+            plant = bug if owner is None else swapping(owner, attribute, bug)
             self.mutants.append(Mutant(name, rule, seed, plant))
-            return plant
+            return bug
 
         return note

@@ -12,13 +12,15 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Final
 
-from tests.gate.mutants import MUTANTS
+from tests.deployed import TABLE, TEXT
+from tests.gate import node, supervisor, vhub
+from tests.gate.planting import Mutant
 from tests.swarm.campaign import fly
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
+MUTANTS: Final[tuple[Mutant, ...]] = (*node.MUTANTS, *supervisor.MUTANTS, *vhub.MUTANTS)
+"""Bugs planted in the cores, one rule switched off each: to add one, a function in `node`, `supervisor` or `vhub`."""
 SEEDS: Final = 1000
 
 
@@ -36,7 +38,7 @@ class Found:
 def find(name: str, seeds: Sequence[int]) -> Found:
     """Fly seeds, one after the other, until one finds a bug."""
     mutant = next(mutant for mutant in MUTANTS if mutant.name == name)
-    text = TABLE.read_text()
+    text = TEXT
     begun_s = time.process_time()
     with mutant.planted():
         for seed in seeds:

@@ -15,7 +15,7 @@ from foosim.supervisor.pacing import Pacer
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.roster import Roster
 from foosim.supervisor.state import InputBuffer, RunState
-from tests.gate.planting import Mutant, Planting, Register
+from tests.gate.planting import Bug, Mutant, Planting, Register, nothing
 
 register = Register()
 
@@ -34,117 +34,80 @@ class _AnyDigest(bytes):
     __hash__ = bytes.__hash__
 
 
-@register("supervisor takes old epochs", "a part counts if its epoch is the supervisor's", 9)
-def _old_epochs(planting: Planting) -> None:
-    def on_part(self: Any, part: Any, payload: bytes, now_ns: int) -> None:
-        state = self.state
-        state.inputs.take_part(part, state.frame.tick, state.members)
-
-    planting.swap(SupervisorCore, "_on_part", on_part)
+@register("supervisor takes old epochs", "a part has the supervisor's epoch", 9, SupervisorCore, "_on_part")
+def _old_epochs(before: Bug, self: Any, part: Any, payload: bytes, now_ns: int) -> None:
+    state = self.state
+    state.inputs.take_part(part, state.frame.tick, state.members)
 
 
-@register("supervisor does not compare input digests", "a part counts if its input digest is the supervisor's", 4)
-def _any_digest(planting: Planting) -> None:
-    before: Any = planting.swap(
-        core, "input_digest_of", lambda digest, edits, delivered: _AnyDigest(before(digest, edits, delivered))
-    )
+@register("supervisor does not compare input digests", "its part's digest is its own", 4, core, "input_digest_of")
+def _any_digest(before: Bug, *given: Any) -> bytes:
+    return _AnyDigest(before(*given))
 
 
-@register("acknowledgements are counted", "a part counts if its sender is in the roster, once for each sender", 1)
-def _counted(planting: Planting) -> None:
-    def take_part(self: Any, part: Any, committed: int, members: Any) -> bool:
-        if not committed < part.tick <= committed + limits.KEPT_TICKS:
-            return False
-        self.parts.setdefault(part.tick, []).append(part)
-        return True
-
-    planting.swap(InputBuffer, "take_part", take_part)
+@register("acknowledgements are counted", "a part counts once for each sender", 1, InputBuffer, "take_part")
+def _counted(before: Bug, self: Any, part: Any, committed: int, members: Any) -> bool:
+    if not committed < part.tick <= committed + limits.KEPT_TICKS:
+        return False
+    self.parts.setdefault(part.tick, []).append(part)
+    return True
 
 
-@register("supervisor does not ask again", "who has had no progress asks again (supervisor)", 2)
-def _patient(planting: Planting) -> None:
-    planting.swap(SupervisorCore, "_request_missing", lambda self, now_ns: self._retry.requested(now_ns))
+@register("supervisor does not ask again", "who has had no progress asks again", 2, SupervisorCore, "_request_missing")
+def _patient(before: Bug, self: Any, now_ns: int) -> None:
+    self._retry.requested(now_ns)
 
 
-@register("supervisor does not answer who asks", "supervisor and vHub keep the last 16 ticks", 1)
-def _mute(planting: Planting) -> None:
-    planting.swap(SupervisorCore, "_on_want", lambda self, want, payload, now_ns: None)
+register("supervisor does not answer who asks", "it keeps the last 16 ticks", 1, SupervisorCore, "_on_want")(nothing)
 
 
-def _spoken_first(actions: list[Any], first: int) -> None:
-    """Put what is said before what is written, from a place on."""
-    said = [action for action in actions[first:] if isinstance(action, Publish)]
-    rest = [action for action in actions[first:] if not isinstance(action, Publish)]
-    actions[first:] = said + rest
+def _spoken_first(before: Bug, self: Any, *given: Any) -> None:
+    """Put what is said before what is written."""
+    first = len(self.actions)
+    before(self, *given)
+    said = [action for action in self.actions[first:] if isinstance(action, Publish)]
+    rest = [action for action in self.actions[first:] if not isinstance(action, Publish)]
+    self.actions[first:] = said + rest
 
 
-@register("commit is said before it is written", "the supervisor journals commits before it publishes", 1)
-def _hasty_commit(planting: Planting) -> None:
-    def publish_commit(self: Any, *given: Any) -> None:
-        first = len(self.actions)
-        before(self, *given)
-        _spoken_first(self.actions, first)
-
-    before: Any = planting.swap(SupervisorCore, "_publish_commit", publish_commit)
+for _what, _method in (("commit", "_publish_commit"), ("epoch", "open_epoch")):
+    _hasty = register(f"{_what} is said before it is written", "the journal comes first", 1, SupervisorCore, _method)
+    _hasty(_spoken_first)
 
 
-@register("epoch is said before it is written", "the supervisor journals epochs before it publishes", 1)
-def _hasty_epoch(planting: Planting) -> None:
-    def open_epoch(self: Any, *given: Any) -> None:
-        first = len(self.actions)
-        before(self, *given)
-        _spoken_first(self.actions, first)
-
-    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
-
-
-@register("requests are not journalled", "a request is journalled when its tick is chosen, then answered", 1)
-def _unwritten(planting: Planting) -> None:
-    def accept(self: Any, *given: Any, **named: Any) -> Any:
-        actions = self._state.actions
-        first = len(actions)
-        answer = before(self, *given, **named)
-        actions[first:] = [action for action in actions[first:] if not isinstance(action, Journal)]
-        return answer
-
-    before: Any = planting.swap(Requests, "_accept", accept)
+@register("requests are not journalled", "a request is journalled, then answered", 1, Requests, "_accept")
+def _unwritten(before: Bug, self: Any, *given: Any, **named: Any) -> Any:
+    actions = self._state.actions
+    first = len(actions)
+    answer = before(self, *given, **named)
+    actions[first:] = [action for action in actions[first:] if not isinstance(action, Journal)]
+    return answer
 
 
-@register("refusals are not journalled", "the same id gets the same answer over restarts", 1)
-def _unwritten_refusal(planting: Planting) -> None:
-    def write(self: Any, verb: str, answer: Any, *added: Any) -> Any:
-        actions = self._state.actions
-        first = len(actions)
-        before(self, verb, answer, *added)
-        if not answer.accepted:
-            actions[first:] = []
-        return answer
-
-    before: Any = planting.swap(Requests, "_write", write)
+@register("refusals are not journalled", "the same id gets the same answer over restarts", 1, Requests, "_write")
+def _unwritten_refusal(before: Bug, self: Any, verb: str, answer: Any, *added: Any) -> Any:
+    actions = self._state.actions
+    first = len(actions)
+    before(self, verb, answer, *added)
+    if not answer.accepted:
+        actions[first:] = []
+    return answer
 
 
-@register("requests are done each time they come", "the same id gets the same answer", 1)
-def _each_time(planting: Planting) -> None:
-    def on_request(self: Any, request: Any, payload: bytes, now_ns: int) -> None:
-        self._state.answers.pop((request.sender, request.id), None)
-        before(self, request, payload, now_ns)
-
-    before: Any = planting.swap(Requests, "on_request", on_request)
+@register("requests are done each time they come", "the same id gets the same answer", 1, Requests, "on_request")
+def _each_time(before: Bug, self: Any, request: Any, payload: bytes, now_ns: int) -> None:
+    self._state.answers.pop((request.sender, request.id), None)
+    before(self, request, payload, now_ns)
 
 
-@register("requests do not outlive the supervisor", "a request keeps its tick over epochs and restarts", 5)
-def _forgotten(planting: Planting) -> None:
-    planting.swap(RunState, "restore_requests", lambda self, history: None)
+register("requests do not outlive the supervisor", "a request keeps its tick", 5, RunState, "restore_requests")(nothing)
 
 
-@register("orders lose their edits in a new epoch", "orders from c on are issued again, equal", 25)
-def _other_orders(planting: Planting) -> None:
-    def open_epoch(self: Any, *given: Any) -> None:
-        for tick in range(self.state.frame.tick, self.state.released):
-            self.state.orders[tick] = []
-        before(self, *given)
-
-    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+@register("orders lose their edits in a new epoch", "orders are issued again, equal", 25, SupervisorCore, "open_epoch")
+def _other_orders(before: Bug, self: Any, *given: Any) -> None:
+    for tick in range(self.state.frame.tick, self.state.released):
+        self.state.orders[tick] = []
+    before(self, *given)
 
 
 @register("orders are not issued again", "orders from c on are issued again", 1)
@@ -159,95 +122,65 @@ def _no_orders(planting: Planting) -> None:
     planting.swap(SupervisorCore, "_on_want", lambda self, want, payload, now_ns: None)
 
 
-@register("orders run ahead", "order k is released once tick k - W is committed", 1)
-def _run_ahead(planting: Planting) -> None:
-    before: Any = planting.swap(
-        Pacer, "may_release", lambda self, tick, committed, now_ns: before(self, tick, committed + 3, now_ns)
-    )
+@register("orders run ahead", "order k is released once tick k - W is committed", 1, Pacer, "may_release")
+def _run_ahead(before: Bug, self: Any, tick: int, committed: int, now_ns: int) -> Any:
+    return before(self, tick, committed + 3, now_ns)
 
 
-@register("epoch does not grow", "epochs only grow", 1)
-def _same_epoch(planting: Planting) -> None:
-    def open_epoch(self: Any, *given: Any) -> None:
-        self.state.epoch = max(0, self.state.epoch - (self.state.epoch % 3 == 2))
-        before(self, *given)
-
-    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+@register("epoch does not grow", "epochs only grow", 1, SupervisorCore, "open_epoch")
+def _same_epoch(before: Bug, self: Any, *given: Any) -> None:
+    self.state.epoch = max(0, self.state.epoch - (self.state.epoch % 3 == 2))
+    before(self, *given)
 
 
-@register("robots are not adopted", "a lost node's robots are adopted", 1)
-def _orphans(planting: Planting) -> None:
-    planting.swap(NodeLoss, "adopted", lambda self, lost, members: dict(self._state.owners))
+@register("robots are not adopted", "a lost node's robots are adopted", 1, NodeLoss, "adopted")
+def _orphans(before: Bug, self: Any, lost: Any, members: Any) -> Any:
+    return dict(self._state.owners)
 
 
-@register("robots do not go back", "adopted robots go back to the node that returns", 1)
-def _kept_robots(planting: Planting) -> None:
-    def join(self: Any, process: Any, now_ns: int) -> None:
-        if self._state.members:
-            self._state.returns.clear()
-        before(self, process, now_ns)
-
-    before: Any = planting.swap(NodeLoss, "join", join)
+@register("robots do not go back", "adopted robots go back to the node that returns", 1, NodeLoss, "join")
+def _kept_robots(before: Bug, self: Any, process: Any, now_ns: int) -> None:
+    if self._state.members:
+        self._state.returns.clear()
+    before(self, process, now_ns)
 
 
-@register("a chosen owner is forgotten", "a robot that somebody moved stays where it was moved to", 7)
-def _unmoved(planting: Planting) -> None:
-    planting.swap(NodeLoss, "moved", lambda self, robot: None)
+register("a chosen owner is forgotten", "a robot stays where it was moved to", 7, NodeLoss, "moved")(nothing)
+register("a lost node stays on the list", "a lost node may come back by the handshake", 1, Roster, "lose")(nothing)
 
 
-@register("a lost node stays on the list", "a lost node may come back by the handshake", 1)
-def _never_lost(planting: Planting) -> None:
-    planting.swap(Roster, "lose", lambda self, process: None)
+@register("a stopped node comes back", "who was stopped is not let in until it is started", 21, Handshake, "on_hello")
+def _unstopped(before: Bug, self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
+    self._state.roster.stopped.discard(hello.name)
+    before(self, hello, payload, now_ns)
 
 
-@register("a stopped node comes back", "who was stopped is not let in until it is started", 21)
-def _unstopped(planting: Planting) -> None:
-    def on_hello(self: Any, hello: Any, payload: bytes, now_ns: int) -> None:
-        self._state.roster.stopped.discard(hello.name)
-        before(self, hello, payload, now_ns)
-
-    before: Any = planting.swap(Handshake, "on_hello", on_hello)
+register("an old epoch is not told", "an old epoch in a heartbeat is answered", 22, RunState, "publish_epoch")(nothing)
 
 
-@register("an old epoch is not told", "an old epoch in a heartbeat is answered with the present one", 22)
-def _untold(planting: Planting) -> None:
-    planting.swap(RunState, "publish_epoch", lambda self: None)
+@register("edits are folded for ever", "a fold gives what is not committed yet", 1, records, "_commit")
+def _stale_edits(before: Bug, history: Any, record: Any) -> None:
+    edits = {tick: list(each) for tick, each in history.edits.items()}
+    before(history, record)
+    history.edits.update(edits)
 
 
-@register("edits are folded for ever", "a fold gives what is not committed yet", 1)
-def _stale_edits(planting: Planting) -> None:
-    def commit(history: Any, record: Any) -> None:
-        edits = {tick: list(each) for tick, each in history.edits.items()}
-        before(history, record)
-        history.edits.update(edits)
-
-    before: Any = planting.swap(records, "_commit", commit)
+@register("the roster of the epoch is not kept", "every node of the epoch has a part", 1, SupervisorCore, "open_epoch")
+def _short_roster(before: Bug, self: Any, owners: Any, now_ns: int, members: Any = None) -> None:
+    before(self, owners, now_ns, members)
+    state, owning = self.state, {*owners.values()}
+    state.members = tuple(name for name in state.members if name in owning)[: max(1, len(owning) - 1)]
 
 
-@register("the roster of the epoch is not kept", "the barrier passes with every node of the epoch", 1)
-def _short_roster(planting: Planting) -> None:
-    def open_epoch(self: Any, owners: Any, now_ns: int, members: Any = None) -> None:
-        before(self, owners, now_ns, members)
-        state, owning = self.state, {*owners.values()}
-        state.members = tuple(name for name in state.members if name in owning)[: max(1, len(owning) - 1)]
-
-    before: Any = planting.swap(SupervisorCore, "open_epoch", open_epoch)
+@register("a lost commit is not said again", "commits are asked for again and kept", 1, SupervisorCore, "_on_want")
+def _lost_commit(before: Bug, self: Any, want: Any, payload: bytes, now_ns: int) -> None:
+    if want.kind != channels.COMMIT.name:
+        before(self, want, payload, now_ns)
 
 
-@register("a lost commit is not said again", "commits are asked for again and kept", 1)
-def _lost_commit(planting: Planting) -> None:
-    def on_want(self: Any, want: Any, payload: bytes, now_ns: int) -> None:
-        if want.kind != channels.COMMIT.name:
-            before(self, want, payload, now_ns)
-
-    before: Any = planting.swap(SupervisorCore, "_on_want", on_want)
-
-
-@register("a loss is told twice", "a commit tells of what is over by it, once", 1)
-def _told_twice(planting: Planting) -> None:
-    before: Any = planting.swap(
-        core, "close_outages", lambda recovered, *when: before(recovered, *when) and recovered[-2:]
-    )
+@register("a loss is told twice", "a commit tells of what is over by it, once", 1, core, "close_outages")
+def _told_twice(before: Bug, recovered: Any, *when: Any) -> Any:
+    return before(recovered, *when) and recovered[-2:]
 
 
 MUTANTS: Final[tuple[Mutant, ...]] = tuple(register.mutants)

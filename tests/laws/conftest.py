@@ -22,9 +22,8 @@ from foosim.simulation.settings import Traced
 from foosim.simulation.system import Settings, System
 from foosim.supervisor.settings import RunSettings
 from foosim.world.frame import Frame
+from tests.deployed import TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT: Final = TABLE.read_text()
 NODES: Final = ("n1", "n2")
 PLAYERS: Final = ("player-blue", "player-red")
 TICKS: Final = 100

@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
-from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
@@ -28,9 +27,9 @@ from foosim.simulation.system import Settings, System
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.recording.rows_of_closing import packet_row
 from foosim.world.frame import Frame
+from tests.deployed import TABLE, TEXT
 from tests.whole_worlds import assets, written, yard
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 600
 MS: Final = 1_000_000
 LINK: Final = "delay: 1 ms, jitter: {shape: gamma, mean: 1 ms, sd: 1 ms}, loss: 20 %, duplicate: 10 %, order: free"
@@ -94,7 +93,7 @@ def run(sets: Sequence[str], text: str = "", ticks: int = TICKS, kills: Mapping[
 
     settings = Settings(on_closing=lambda closing: flights.extend(closing.fates))
     given = ["engine=pure", *sets]
-    result = rehearse(text or TABLE.read_text(), TABLE.name, ticks, 2, given, settings, prepare=prepare)
+    result = rehearse(text or TEXT, TABLE.name, ticks, 2, given, settings, prepare=prepare)
     assert result.json["reason"] == "done" and len(result.json["recoveries"]) == len(kills or {})
     return rows_of(flights, deployments[0])
 
@@ -123,7 +122,7 @@ def test_a_further_subscriber_of_a_broadcast_changes_no_other_packet() -> None:
 
 def test_the_order_in_which_a_deployment_names_robots_channels_and_players_is_nothing() -> None:
     ticks, sets = 400, (LOSSY, *BEFORE, HEARD, listener("[bumper, encoder]", 2))
-    tree = yaml.safe_load(apply_sets(TABLE.read_text(), TABLE.name, sets))
+    tree = yaml.safe_load(apply_sets(TEXT, TABLE.name, sets))
     named = run((), yaml.safe_dump(tree, sort_keys=True), ticks)
     assert len(named) > 1_500
     for section in ("robots", "players", "nodes"):

@@ -233,6 +233,17 @@ def test_scanners_see_what_is_there() -> None:
     assert seen[1] < 1.0 < min(seen[0], seen[2]), seen
 
 
+@pytest.mark.parametrize("tick", [2, 3])
+def test_a_robot_that_goes_counts_what_it_measured_in_its_last_tick(tick: int) -> None:
+    """Noise is drawn by the number of a sample: that of the next one, when it is back, is another one."""
+    found = []
+    for events in ([], [{"at": f"{tick * 10} ms", "entity": "k-1", "remove": True}]):
+        with Simulation(load_deployment(text(events), NAME)) as simulation:
+            simulation.step(ticks=tick + 1)
+            found.append(simulation.frame.at("k-1", "pose.samples"))
+    assert found[0] == found[1] > 0.0
+
+
 def middle_ray(simulation: Simulation) -> float:
     scan = simulation.readings["w-1", "scan"].value
     assert isinstance(scan, Scan)

@@ -34,9 +34,9 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub.stages.receiver import RECEIVER_DOWN
 from foosim.vhub.state.existence import robots_it_lives_by
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
+from tests.deployed import DEPLOYMENT
 from tests.kinematic_yard import yard_text
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 140
 TICK_NS: Final = 10_000_000
 PERIOD: Final = 2
@@ -288,7 +288,7 @@ def test_a_player_that_is_lost_while_it_does_not_exist_holds_nothing_and_comes_b
     assert (times[120] - times[75] > 1_000_000_000) is (back_ms > 1000)
 
 
-def test_in_realtime_a_run_that_goes_on_without_such_a_player_is_the_same() -> None:
+def test_in_realtime_a_run_that_continues_without_such_a_player_is_the_same() -> None:
     """It leaves after `client_back`, and joins again before its robot is added: to nobody was it away."""
     states: list[System] = []
 
@@ -477,7 +477,7 @@ def test_without_a_network_its_players_come_and_go_as_well(monkeypatch: pytest.M
 def test_a_player_lives_by_robots_that_it_commands_is_on_or_hears(
     robots: list[str], on: str | None, lives_by: tuple[str, ...]
 ) -> None:
-    deployment = load_deployment(TABLE.read_text(), TABLE.name)
+    deployment = DEPLOYMENT
     player = deployment.players["player-red"].model_copy(update={"robots": {name: [] for name in robots}, "on": on})
     assert robots_it_lives_by(deployment, player) == lives_by
 

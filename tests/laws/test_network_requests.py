@@ -13,22 +13,20 @@ from hypothesis import strategies as st
 
 from foosim.capture.rows import EPOCHS, RECOVERIES
 from foosim.common.json_text import encode_json
-from foosim.deployment.loader import load_deployment
 from foosim.simulation.journals import ENDINGS, Ending
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
-from foosim.vhub.recording.rows_of_closing import packet_entry, world_rows
 from foosim.vhub.state.records import Closing
 from foosim.world.edits import Disrupt
+from tests.deployed import DEPLOYMENT, TABLE, TEXT
+from tests.frames import rows_of
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 160
 SETS: Final = (
     *("engine=pure", "table.rules.kickoff_delay=20 ms"),
     "network.links=[{id: lan, between: ['*', '*'], delay: 1 ms, jitter: {shape: gamma, sd: 2 ms}, loss: 2 %}]",
 )
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 EVENTS: Final[Sequence[tuple[int, dict[str, Any]]]] = (
     (20, {"partition": [["player-red"], ["rest"]], "for": "20 ms"}),
     (40, {"clog": {"from": "camera", "to": "player-*"}}),
@@ -52,31 +50,18 @@ def lose_supervisor(system: System) -> None:
         system.later(5_000_000, lambda: system.start("supervisor"))
 
 
-def rows_in(closings: Sequence[Closing]) -> list[Any]:
-    """The rows of all closings without the wall's time, who computed and who was lost."""
-    rows: list[Any] = []
-    known = None
-    for closing in closings:
-        entries = *world_rows(closing, DEPLOYMENT, known), *map(packet_entry, closing.fates)
-        for topic, at_ns, _, number, row in entries:
-            fields = {name: getattr(row, name) for name in row.__struct_fields__ if not name.startswith("wall_")}
-            if topic not in (RECOVERIES, EPOCHS):
-                rows.append((topic, at_ns, number, fields))
-        known = closing.frame
-    return rows
-
-
 def fly(
     prepare: Callable[[System], None], nodes: int = 2, capture: Path | None = None
 ) -> tuple[list[Any], dict[str, Any]]:
     """Rehearse; return the rows, and the tick of each answer by request."""
     closings: list[Closing] = []
-    text = TABLE.read_text()
+    text = TEXT
     told = Settings(on_closing=closings.append, keeps_journals=True)
     run = rehearse(text, TABLE.name, TICKS, nodes, SETS, told, prepare=prepare, capture=capture)
     assert run.json["reason"] == "done"
     assert all(answer.accepted for answer in run.answers.values()), run.answers
-    return rows_in(closings), {identity: answer.tick for identity, answer in run.answers.items()}
+    ticks = {identity: answer.tick for identity, answer in run.answers.items()}
+    return rows_of(closings, DEPLOYMENT, RECOVERIES, EPOCHS), ticks
 
 
 def asking(faults: Sequence[tuple[int, Fault]], asked: list[str]) -> Callable[[System], None]:
@@ -117,7 +102,7 @@ FAULTS = st.one_of(st.just(lose_supervisor), st.builds(lose_hub, st.sampled_from
 
 
 @pytest.mark.parametrize("fault", [lose_supervisor, lose_hub("now")], ids=["supervisor", "vhub"])
-def test_who_is_lost_as_it_is_asked_does_not_change_what_happens(fault: Fault) -> None:
+def test_a_process_lost_at_a_request_changes_no_event(fault: Fault) -> None:
     assert_same([(tick, fault) for tick in (21, 52, 71, 101)])
 
 
@@ -127,7 +112,7 @@ def test_losses_at_any_tick_change_nothing(faults: Sequence[tuple[int, Fault]], 
     assert_same(faults, nodes)
 
 
-def test_a_re_simulation_has_what_was_asked_for(tmp_path: Path) -> None:
+def test_a_re_simulation_has_the_requested_events(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     fly(asking([], []), capture=path)
     assert verify_capture(path, nodes=3).equal

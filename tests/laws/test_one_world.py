@@ -26,10 +26,7 @@ from foosim.common.errors import Malformed
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.library.table.settings import table_of
 from foosim.node.physics.mujoco_islands import CompositionEngine
-from foosim.node.physics.pure_engine import PureEngine
-from foosim.node.tick import Stepper, Work
 from foosim.protocol.channels import SUPERVISOR
 from foosim.runtime.roles.bus import CALM, Weather
 from foosim.simulation.check.component_check import ComponentCheck
@@ -42,20 +39,18 @@ from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import Between, verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.vhub.state.records import Closing
-from foosim.world.assembly.islands import Assignment, Share, islands_of, table_reach_of, touching_of
+from foosim.world.assembly.islands import Assignment, Share
 from foosim.world.assembly.rest import Rest
 from foosim.world.assembly.used_forms import forms_of
 from foosim.world.assembly.volumes import BodyIsland, Volumes
-from foosim.world.assembly.world import initial_numbers
-from foosim.world.components.reach import Island, Reach
+from foosim.world.components.reach import Island
 from foosim.world.edits import counters, parked
 from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
-from foosim.world.layout import Entity, build_layout
+from foosim.world.layout import Entity
 from tests.forms.test_forms import ALONE, own
 from tests.forms.worlds import DEPLOY, still
 from tests.frames import Frames
-from tests.placing import place_ball
 from tests.simulation.test_verify import messages_of
 from tests.swarm.world_bounds import strays
 from tests.whole_worlds import NAME, assets, mixed, written, yard
@@ -320,7 +315,7 @@ def test_what_is_held_is_in_the_island_of_its_holders_and_is_handed_over() -> No
 
 
 # --- planted faults --------------------------------------------------------------------------------------------------
-# Faults of the engines are planted in `test_engine_partition.py`, of speaking and committing in `test_trace_laws.py`.
+# Faults of the engines are planted in `test_engine_partition.py`, of speaking and committing in `tests/gate/`.
 
 
 def rebuild_all(system: System) -> None:
@@ -410,46 +405,3 @@ def test_a_body_that_anothers_island_holds_is_caught(
     monkeypatch.setattr(Volumes, "islands", holding)
     with pytest.raises(caught):
         run(world_of("everything"), nodes)
-
-
-def kicked_towards_the_next_rod() -> tuple[Stepper, list[float]]:
-    """The table at ticks of 10 ms: a resting ball before a turning foot, the other team's rod 99 mm ahead of it."""
-    text = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure", "tick=10 ms", "substeps=20"])
-    deployment = load_deployment(text, TABLE.name)
-    layout = build_layout(deployment)
-    numbers = initial_numbers(deployment, layout)
-    radius_m = table_of(deployment).ball.radius
-    place_ball(numbers, layout["ball"], (-table_of(deployment).lines["midfield"].x - 0.05, 0.0, radius_m))
-    kicker = layout["blue.midfield"]
-    numbers[kicker.offsets["joint_velocities"] + 1] = 140.0
-    numbers[kicker.offsets["position.set_point"] + 1] = 100.0
-    return Stepper(deployment, layout), numbers
-
-
-def solve(stepper: Stepper, numbers: Sequence[float], reach: Reach) -> list[float]:
-    """Solve each island of a tick in an engine of its own; return the numbers after it."""
-    after = list(numbers)
-    entities = stepper.layout.entities
-    for island in islands_of(numbers, reach, touching_of(numbers, reach)):
-        bodies = tuple(entities[index] for index in island.entities)
-        work = Work(0, stepper.layout, (bodies,), island.entities, list(numbers), {})
-        stepper.solve(PureEngine(stepper.deployment, stepper.layout), work)
-        for body in bodies:
-            after[body.start : body.split] = work.numbers[body.start : body.split]
-    return after
-
-
-def test_reach_from_present_speed_is_caught() -> None:
-    """A resting ball has no present speed, and reaches the next rod within the tick in which it is kicked."""
-    stepper, numbers = kicked_towards_the_next_rod()
-    absent = [entity.index for entity in stepper.layout.entities if entity.is_absent(numbers)]
-    declared = table_reach_of(stepper.deployment, stepper.layout).without(absent)
-    present = replace(declared, ball_m=table_of(stepper.deployment).ball.radius)
-    together = list(numbers)
-    bodies = tuple(entity for entity in stepper.layout.present(numbers) if entity.is_solved)
-    work = Work(0, stepper.layout, (bodies,), tuple(body.index for body in bodies), together, {})
-    stepper.solve(PureEngine(stepper.deployment, stepper.layout), work)
-    for name in ("red.midfield", "blue.midfield"):
-        assert together[stepper.layout[name].offsets["contacts"]] > 0, name
-    assert solve(stepper, numbers, declared) == together
-    assert solve(stepper, numbers, present) != together

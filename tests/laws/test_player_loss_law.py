@@ -25,9 +25,9 @@ from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
+from tests.deployed import TABLE, TEXT
 from tests.turns import BY_PERIOD
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 RED: Final = "player-red"
 SETS: Final = ("engine=pure", "substeps=1", "table.rules.kickoff_delay=20 ms", *BY_PERIOD)
 AT_ARRIVAL: Final = (f"players.{RED}.act=arrival", f"players.{RED}.arrivals={{camera: [ball]}}")
@@ -67,7 +67,7 @@ class Run:
         settings.on_journal = lambda name, record: self.records.append(record) if name == "vhub" else None
         kind = Pace("fast") if pace == "fast" else Pace("realtime", Fraction(1))
         told: dict[str, Any] = {"prepare": prepare, "capture": path, "pace": kind}
-        self.json = rehearse(TABLE.read_text(), TABLE.name, TICKS, 2, (*SETS, *sets), settings, **told).json
+        self.json = rehearse(TEXT, TABLE.name, TICKS, 2, (*SETS, *sets), settings, **told).json
 
     def comings(self) -> list[tuple[int, str]]:
         rows = [row for row in open_capture(self.path).rows(CLIENTS) if isinstance(row, ClientRow)]
@@ -145,7 +145,7 @@ def test_in_realtime_it_leaves_at_the_tick_that_it_owes_and_comes_back_at_a_late
 @pytest.mark.parametrize(
     ("pace", "line"), [("fast", 0), ("fast", 1), ("realtime", 0), ("realtime", 1), ("realtime", 2), ("realtime", -1)]
 )
-def test_a_line_of_the_account_outlives_the_vhub_that_was_to_tell_it(tmp_path: Path, pace: str, line: int) -> None:
+def test_a_line_of_the_account_outlives_the_vhub_that_was_to_report_it(tmp_path: Path, pace: str, line: int) -> None:
     """The vHub dies at the record of an absence, when that is written and nothing is said of it; or (-1), of the tick
     at which a player leaves, when the record of the tick alone is written."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from pathlib import Path
 from typing import Final
 
 import pytest
@@ -24,10 +23,10 @@ from foosim.supervisor.settings import RunSettings
 from foosim.vhub.core import HubCore
 from foosim.vhub.state.records import Closing
 from foosim.vhub.state.resume import Past
+from tests.deployed import TABLE, TEXT
 from tests.machine_loss import lose_hub, lose_supervisor
 from tests.swarm.faults import ask
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 MS: Final = 1_000_000
 TICKS: Final = 160
 NAMES: Final = ("n1", "n2", "n3")
@@ -59,7 +58,7 @@ class Cut:
         hub: type[HubCore] = _Hub,
     ) -> None:
         self.closings: list[Closing] = []
-        text = with_nodes(TABLE.read_text(), TABLE.name, len(NAMES), ["engine=pure", "substeps=1"])
+        text = with_nodes(TEXT, TABLE.name, len(NAMES), ["engine=pure", "substeps=1"])
         run = RunSettings("run", TABLE.name, text, Pace("fast"), TICKS, options=(TABLE.name, "--for", "5s"))
         settings = Settings(
             weather=weather, hub=hub, keeps_journals=True, restart_ns=500 * MS, on_closing=self.closings.append
@@ -156,7 +155,7 @@ def test_a_supervisor_that_was_started_again_ends_it_too(hub: int, supervisor: i
     assert fold(state.deployment, cut.system.journal).kept.end is None and not cut.system.hub.finished
 
 
-def test_a_supervisor_that_alone_has_lost_its_machine_goes_on_from_the_vhubs_commit() -> None:
+def test_a_supervisor_that_alone_has_lost_its_machine_continues_from_the_vhubs_commit() -> None:
     """What was ordered up to there is not ordered again."""
 
     def add(system: System) -> None:

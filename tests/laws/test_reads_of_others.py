@@ -16,7 +16,7 @@ import pytest
 from foosim.deployment.loader import load_deployment
 from foosim.node.edited_frame import edit
 from foosim.simulation.run import rehearse
-from foosim.simulation.system import Settings, System
+from foosim.simulation.system import Settings
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Remove
 from foosim.world.forms.forms import NO_ENTITY
@@ -24,7 +24,6 @@ from foosim.world.frame import Frame
 from tests.forms.worlds import HALL, TABLE, World, driver
 from tests.frames import Frames, broken_laws
 from tests.placing import added_ball
-from tests.swarm.faults import PUSH_MAX
 
 NAME: Final = "others.yaml"
 READERS: Final = """
@@ -111,25 +110,6 @@ def test_entity_rules_and_actuators_see_others_as_they_were(readers: str) -> Non
         assert len({frame.at("rover-1", field) for frame in frames.frames}) > 5, field
 
 
-def test_a_number_that_is_not_finite_ends_the_run_with_its_writer(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    written = "view.write(self.set_point, 1.0, float('nan') if view.tick == 7 else 0.0)"
-    source = READERS.replace("view.write(self.set_point, *set_point)", written)
-    (tmp_path / "own_nan.py").write_text(source)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    invalidate_caches()
-    rules = {"battery": {"kind": "battery"}, "follows": {"kind": "own_nan:Follows"}}
-    world = HALL.with_(("robots", "rover-2", "rules"), rules, ())
-    for rover in ("rover-1", "rover-2", "rover-3"):
-        world = world.with_(("robots", rover, "actuators"), {"drive": {"kind": "own_nan:Asks"}}, ())
-    text = World(world.data | {"players": driver(("rover-1",), "own_nan:Asks", (1.0, 1.0), "10 Hz")}).text()
-    done = rehearse(text, NAME, 50, 2)
-    assert done.json["failed"]
-    assert "rule follows of rover-2 failed at tick 7" in done.json["reason"]
-    assert "1.0, nan for rover-2 follows.set_point: numbers of a frame are finite (own_nan.py:" in done.json["reason"]
-
-
 def test_what_comes_under_the_name_of_what_went_in_one_order_is_new() -> None:
     """Its memory, that of rules about it, and references to the old one are gone."""
     deployment = load_deployment(TABLE.text(), NAME)
@@ -146,21 +126,3 @@ def test_what_comes_under_the_name_of_what_went_in_one_order_is_new() -> None:
     assert after[spare.offsets["position"]] == 0.1
     numbers[other] = NO_ENTITY
     assert after[: spare.start] == numbers[: spare.start] and after[spare.stop :] == numbers[spare.stop :]
-
-
-def test_a_state_that_cannot_be_is_said_once_with_what_it_is() -> None:
-    """A ball faster than its limit stands in quarantine from then on; the small run of engines says nothing."""
-    lines: list[str] = []
-
-    def prepare(system: System) -> None:
-        for _ in range(2):
-            system.at_tick(30, lambda: system.request("push", name="ball", impulse=[PUSH_MAX, 0.0, 0.0]))
-
-    rehearse(
-        TABLE.text(), NAME, 60, 2, settings=Settings(on_log=lambda *said: lines.append(str(said))), prepare=prepare
-    )
-    said = [line for line in lines if "quarantine" in line]
-    assert (
-        len(said) == 1
-        and "ball is in quarantine until a rule or an order ends it: its new state is not within" in said[0]
-    )

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
-from foosim.common.json_text import encode_json
 from foosim.common.units import Pace
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR
-from foosim.protocol.codec import decode, encode
-from foosim.protocol.messages import Answer, Request
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.settings import Traced
-from foosim.simulation.system import OPERATOR, Settings, System
+from foosim.simulation.system import Settings, System
 from foosim.supervisor.node_loss import NodeLoss
-from foosim.vhub.state.records import Closing
+from tests.deployed import TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 300
 IMPATIENT: Final = (
     "engine=pure",
@@ -53,7 +48,7 @@ def move(robot: str, node: str) -> Callable[[System], object]:
 
 @cache
 def undisturbed(sets: tuple[str, ...] = PURE, ticks: int = TICKS) -> Rehearsed:
-    return rehearse(TABLE.read_text(), TABLE.name, ticks, 1, sets)
+    return rehearse(TEXT, TABLE.name, ticks, 1, sets)
 
 
 def disturbed(
@@ -64,7 +59,7 @@ def disturbed(
             system.at_tick(tick, partial(fault, system))
 
     pace = chosen.pop("pace", None)
-    return rehearse(TABLE.read_text(), TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare)
+    return rehearse(TEXT, TABLE.name, ticks, nodes, sets, Settings(**chosen), pace=pace, prepare=prepare)
 
 
 def told(run: Rehearsed) -> list[tuple[str, str]]:
@@ -88,11 +83,6 @@ def test_robots_go_back_to_the_node_that_they_were_adopted_from() -> None:
 
 def undisturbed_robots(run: Rehearsed) -> list[str]:
     return [robot for node in run.json["nodes"].values() for robot in node["owned"]]
-
-
-def test_a_robot_that_was_moved_meanwhile_stays() -> None:
-    run = disturbed([(30, kill("n2")), (60, move("camera", "n3")), (61, move("camera", "n1")), (80, start("n2"))])
-    assert "camera" in run.json["nodes"]["n1"]["owned"] and run.digests == undisturbed().digests
 
 
 def test_the_last_node_is_lost_and_the_world_waits_for_one() -> None:
@@ -158,7 +148,7 @@ def test_an_epoch_without_a_node_is_no_answer_to_its_ready() -> None:
 
 
 @pytest.mark.parametrize("sets", ["nodes.n2.required=true", "on_node_loss=stop"])
-def test_where_the_deployment_says_so_the_run_ends(sets: str) -> None:
+def test_a_lost_node_ends_the_run_where_the_deployment_requires_it(sets: str) -> None:
     run = disturbed([(100, kill("n2"))], sets=(*PURE, sets))
     assert run.json["failed"] and run.json["reason"] == "lost n2: its connection closed"
     assert run.digests == undisturbed().digests[: len(run.digests)] and 100 <= run.json["ticks"] <= 105
@@ -220,70 +210,20 @@ def test_a_node_that_does_not_come_back_to_the_supervisor_is_lost() -> None:
     assert told(run) == [("supervisor", "supervisor"), ("node", "n2")]
 
 
-@pytest.mark.parametrize("amid", range(4))
-def test_what_was_asked_is_kept_by_the_next_supervisor(amid: int) -> None:
-    """A push, a move and a pause, each with a supervisor that ends in the turn that answers it.
+FREEZE: Final = (*PURE, "on_node_loss=freeze")
 
-    Either it was written, and takes effect at the tick of its answer, or nobody was answered.
-    """
-    asked: dict[str, str] = {}
-    pushes: list[int] = []
-    told: list[Answer] = []
 
-    def ask(system: System, verb: str, **arguments: Any) -> None:
-        asked[verb] = system.request(verb, **arguments)
-        ask_again(system, Request(OPERATOR, asked[verb], verb, encode_json(arguments)))
-
-    def ask_again(system: System, request: Request, times: int = 10) -> None:
-        """As an operator's command does; here also when it is answered."""
-        if times:
-            system.bus.put(OPERATOR, channels.REQUEST, OPERATOR, encode(request), system.bus.now_ns)
-            system.later(50 * MS, partial(ask_again, system, request, times - 1))
-
-    def prepare(system: System) -> None:
-        things: dict[str, dict[str, Any]] = {
-            "push": {"impulse": [0.01, 0.0, 0.0]},
-            "move": {"robot": "camera", "node": "n3"},
-            "pause": {},
-        }
-        for number, (verb, arguments) in enumerate(things.items()):
-            tick = 50 * (number + 1)
-            system.at_tick(tick, partial(ask, system, verb, **arguments))
-            system.at_tick(tick, partial(restart(0, amid), system))
-        system.at_tick(150, lambda: system.later(1_000 * MS, partial(go_on, system)))
-
-    def go_on(system: System) -> None:
-        assert system.supervisor.state.pacer.paused and system.supervisor.state.owners["camera"] == "n3"
-        answers = {verb: [answer for answer in told if answer.id == asked[verb]] for verb in asked}
-        for verb, same in answers.items():
-            assert same and all(answer == same[0] and answer.accepted for answer in same), verb
-        ticks.append(answers["push"][0].tick)
-        system.request("resume")
-
-    def see(traced: Traced) -> None:
-        if traced.what == "publish" and traced.channel == channels.ANSWER.name:
-            told.append(decode(Answer, traced.payload))
-
-    def close(closing: Closing) -> None:
-        pushes.extend([closing.frame.tick - 1] * len(closing.edits))
-
-    ticks: list[int] = []
-    chosen = Settings(keeps_journals=True, on_closing=close, observer=see)
-    run = rehearse(TABLE.read_text(), TABLE.name, TICKS, 3, PURE, chosen, pace=Pace("realtime"), prepare=prepare)
-    assert run.json["reason"] == "done" and len(run.digests) == TICKS
-    assert pushes == ticks and len(ticks) == 1, "pushed once, at the tick of the answer"
+def add_those_down(found: list[list[str]], system: System) -> None:
+    """Note the robots that are out of service."""
+    frame = system.supervisor.state.frame
+    found.append([robot.name for robot in frame.layout.robots if frame.at(robot.name, "down") != 0.0])
 
 
 def test_with_freeze_the_robots_of_a_lost_node_are_down_until_it_is_back() -> None:
     down: list[list[str]] = []
-
-    def look(system: System) -> None:
-        frame = system.supervisor.state.frame
-        down.append([robot.name for robot in frame.layout.robots if frame.at(robot.name, "down") != 0.0])
-
-    sets = (*PURE, "on_node_loss=freeze")
-    faults = [(20, look), (40, kill("n2")), (42, look), (60, move("red.attack", "n1")), (90, look)]
-    run = disturbed([*faults, (100, start("n2")), (200, look)], sets=sets)
+    look = partial(add_those_down, down)
+    faults: list[Fault] = [(20, look), (40, kill("n2")), (42, look), (60, move("red.attack", "n1")), (90, look)]
+    run = disturbed([*faults, (100, start("n2")), (200, look)], sets=FREEZE)
     before, lost, moved, back = down
     assert before == back == []
     assert len(lost) > 1 and "red.attack" in lost and moved == [name for name in lost if name != "red.attack"]
@@ -294,11 +234,7 @@ def test_with_freeze_the_robots_of_a_lost_node_are_down_until_it_is_back() -> No
 def test_with_freeze_an_operators_down_holds_when_the_node_is_back() -> None:
     """Set before the loss, and while the robot is down by it; what is set to be up runs at once."""
     down: list[list[str]] = []
-
-    def look(system: System) -> None:
-        frame = system.supervisor.state.frame
-        down.append([robot.name for robot in frame.layout.robots if frame.at(robot.name, "down") != 0.0])
-
+    look = partial(add_those_down, down)
     its: list[str] = []
 
     def note(system: System) -> None:
@@ -308,6 +244,6 @@ def test_with_freeze_an_operators_down_holds_when_the_node_is_back() -> None:
         return lambda system: system.request("set", name=its[number], field="down", value=value)
 
     faults: list[Fault] = [(10, note), (20, put(0, True)), (40, kill("n2")), (60, put(1, True)), (60, put(2, False))]
-    run = disturbed([*faults, (90, look), (100, start("n2")), (200, look)], sets=(*PURE, "on_node_loss=freeze"))
+    run = disturbed([*faults, (90, look), (100, start("n2")), (200, look)], sets=FREEZE)
     assert down == [[*its[:2], *its[3:]], its[:2]]
     assert run.json["reason"] == "done" and not run.json["failed"]

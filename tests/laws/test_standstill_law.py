@@ -36,8 +36,8 @@ from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.main import SupervisorShell
 from foosim.vhub.core import HubCore
 from foosim.vhub.main import HubOptions, HubShell
+from tests.deployed import TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TICKS: Final = 60
 MS: Final = 1_000_000
 FAST: Final = Pace("fast")
@@ -52,7 +52,7 @@ def fly(fault: Callable[[System], object], pace: Pace = FAST, *sets: str, **chos
     def prepare(system: System) -> None:
         system.at_tick(20, partial(fault, system))
 
-    text = TABLE.read_text()
+    text = TEXT
     return rehearse(text, TABLE.name, TICKS, 2, settings, Settings(**chosen), pace=pace, prepare=prepare)
 
 
@@ -83,7 +83,7 @@ def lose_clients(system: System) -> None:
 
 
 @pytest.mark.parametrize("pace", [FAST, REALTIME], ids=str)
-def test_a_supervisor_whose_machine_slept_blames_nobody(pace: Pace) -> None:
+def test_a_supervisor_whose_machine_slept_loses_no_process(pace: Pace) -> None:
     """It wakes, and has heard nobody for ten seconds."""
     said: list[str] = []
     run = fly(lambda system: system.set_forward(SUPERVISOR, 10_000 * MS), pace, on_log=lambda *say: said.append(say[2]))

@@ -26,7 +26,8 @@ from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.world.edits import Disrupt
-from tests.laws.test_hub_recovery_law import SETS, TABLE, Fault, Seen, assert_the_same, fly, kill_hub
+from tests.deployed import TABLE
+from tests.laws.test_hub_recovery_law import SETS, Fault, Seen, assert_the_same, fly, kill_hub
 from tests.swarm.campaign import fly as fly_seed
 from tests.swarm.faults import TICKS as SWARM_TICKS
 from tests.turns import BY_PERIOD

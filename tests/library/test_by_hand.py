@@ -15,15 +15,13 @@ from typing import Any, Final
 import pytest
 
 from foosim.common.errors import BadValue, UnknownName
-from foosim.deployment.loader import load_deployment
 from foosim.library.table.players.by_hand import DRAWN_RAD, DRAWN_S, KICK_S, KICKED_RAD, LIFTED_RAD, SWING_RAD_MAX
 from foosim.library.table.players.gamepad import AGAIN_TICKS, Gamepad
 from foosim.library.table.players.keyboard import SLIDE_M, SWING_RAD, Keyboard
 from foosim.library.table.rod_position import Command
 from foosim.library.table.settings import table_of
+from tests.deployed import DEPLOYMENT, TABLE
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 SECOND_TICKS: Final = 1_000_000_000 // DEPLOYMENT.tick_ns
 HALF_STROKE: Final = table_of(DEPLOYMENT).lines["goal"].half_stroke
 PLAYS: Final = f"""
@@ -198,7 +196,7 @@ def test_keys_play_and_the_terminal_gets_its_mode_back() -> None:
     assert termios.tcgetattr(terminal.file) == terminal.mode
 
 
-def test_without_a_terminal_the_message_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_terminal_the_message_names_the_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     with open(os.devnull, encoding="utf-8") as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(BadValue, match="the keyboard needs a terminal: declare the player with `launch: manual`"):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import cos, hypot, sin
-from pathlib import Path
 from typing import Any, Final
 
 import pytest
 
 from foosim.client.player import Sample
-from foosim.deployment.loader import load_deployment
 from foosim.library.generic.delay import delay_ns
 from foosim.library.table.ball import BallPosition
 from foosim.library.table.encoder import RodPosition
@@ -20,9 +18,8 @@ from foosim.library.table.players.senses import Senses, rods_of
 from foosim.library.table.players.shot import FULL, LIFTED, Shots
 from foosim.library.table.rod_position import Command
 from foosim.library.table.settings import LINE_NAMES, table_of
+from tests.deployed import DEPLOYMENT
 
-TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)
 LINES = table_of(DEPLOYMENT).lines
 RADIUS = table_of(DEPLOYMENT).ball.radius
 PERIOD = 5
@@ -67,7 +64,7 @@ def figures(line: str) -> list[float]:
 
 @pytest.mark.parametrize("name", ["red", "blue"])
 @pytest.mark.parametrize("y", [-0.25, -0.1, 0.0, 0.2])
-def test_the_keeper_stands_between_ball_and_goal(name: str, y: float) -> None:
+def test_the_keeper_is_between_ball_and_goal(name: str, y: float) -> None:
     bench = Bench(name)
     for _ in range(5):
         commands = bench.act(0.0, y)
@@ -215,7 +212,7 @@ def test_a_full_shot_does_not_climb_the_wall() -> None:
     assert RADIUS + up * up / (2 * table.gravity) < table.walls.height
 
 
-def test_a_ball_that_no_figure_can_stand_beside_is_not_struck() -> None:
+def test_a_ball_out_of_reach_of_all_figures_is_not_struck() -> None:
     """One at the side wall, where the goalkeeper's stroke ends before."""
     held = rod("goal", swing=-0.8, slide=LINES["goal"].half_stroke)
     for y, is_struck in ((held.half_stroke, True), (held.half_stroke + 0.05, False)):

@@ -5,19 +5,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 import pytest
 
-from foosim.deployment.loader import load_deployment
 from foosim.library.table.players import OF_THE_TABLE
 from foosim.simulation.match.figures import chance
 from foosim.simulation.match.game import Fixture, Game, Played, play
+from tests.deployed import DEPLOYMENT, TABLE, TEXT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT: Final = TABLE.read_text()
-MINUTE_TICKS: Final = 60_000_000_000 // load_deployment(TEXT, TABLE.name).tick_ns
+MINUTE_TICKS: Final = 60_000_000_000 // DEPLOYMENT.tick_ns
 AHEAD: Final = 5
 AWAY_MAX: Final = 1
 """Balls that leave the table in a minute."""

@@ -6,7 +6,6 @@ Without noise and with one aim, as the draws of these are each team's own; on th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from random import Random
 from typing import Final
 
@@ -17,9 +16,9 @@ from foosim.library.table.players.football import Playing
 from foosim.library.table.settings import LINE_NAMES
 from foosim.simulation.simulation import Simulation
 from foosim.world.frame import Frame
+from tests.deployed import TABLE
 from tests.placing import place_ball
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NOISELESS: Final = [
     *(f"robots.{team}.{line}.sensors.encoder.modifiers=[]" for team in ("red", "blue") for line in LINE_NAMES),
     "robots.camera.sensors.ball.modifiers=[{kind: delay, time: 10 ms}]",

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from random import Random
 from typing import Final
 
 import pytest
 
-from foosim.deployment.loader import load_deployment
 from foosim.library.table.encoder import RodPosition
 from foosim.library.table.players.motors import Motion, Motors
 from foosim.library.table.players.senses import rods_of
@@ -18,9 +16,8 @@ from foosim.library.table.settings import table_of
 from foosim.simulation.simulation import Simulation
 from foosim.world.components.entities import mounting_of
 from foosim.world.layout import build_layout
+from tests.deployed import DEPLOYMENT, TABLE
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
 PERIOD: Final = 5
 LATE: Final = 5
 """Ticks that a reading is old, and that a command takes."""

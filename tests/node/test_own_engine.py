@@ -23,6 +23,7 @@ from foosim.world.forms import registry
 from foosim.world.forms.forms import ENGINES
 from foosim.world.layout import build_layout
 from foosim.world.scene import Scene, Sphere, Vector
+from tests.own_forms import install
 from tests.placing import place_ball
 from tests.shared_engine import make_shared_engine
 
@@ -68,11 +69,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     known = dict(ENGINES)
     (tmp_path / "own_still.py").write_text(STILL)
     monkeypatch.syspath_prepend(str(tmp_path))
-    about = tmp_path / "still-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: still\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text("[foosim.world]\nstill = own_still\n")
-    registry._entry_points.cache_clear()
+    install(tmp_path, "still", "1.0", "own_still")
     registry._loaded.clear()
     yield
     ENGINES.clear()

@@ -1,21 +1,19 @@
 """A world on one engine, loaded anew from its numbers at every tick, and the experiments that both must pass."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.table.settings import table_of
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.layout import Entity, build_layout
 from foosim.world.scene import Vector, inertia_about_axis
+from tests.deployed import deployed
 from tests.physics.test_rod_drives import Driven
 from tests.placing import place_ball
 from tests.shared_engine import make_shared_engine
 
-TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 Motors = tuple[tuple[float, float], tuple[float, float]]
 OFF: Motors = ((0.0, 0.0), (0.0, 0.0))
 CENTRE: Vector = (0.0, 0.0, 0.0)
@@ -25,7 +23,7 @@ class World:
     """The table with one ball; bodies that an experiment does not name stay parked."""
 
     def __init__(self, *sets: str) -> None:
-        self.deployment = load_deployment(apply_sets(TABLE.read_text(), "table.yaml", sets), "table.yaml")
+        self.deployment = deployed(*sets)
         self.table = table_of(self.deployment)
         self.layout = build_layout(self.deployment)
         self.scene = build_scene(self.deployment, self.layout)

@@ -16,11 +16,10 @@ from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mujoco_islands import SEATED_MAX, CompositionEngine
-from foosim.node.tick import Work
 from foosim.world.components.drives import NO_DRIVES, Drives, Motor
 from foosim.world.matter.physics import Side
 from foosim.world.scene import ORIGIN, Body, Box, Link, turn
-from tests.kinematic_yard import Yard, yard_text
+from tests.kinematic_yard import Together, yard_text
 from tests.solids import GRAVITY, TICK_S, Solids, ball, box, physics, shape
 
 SEED: Final = 34
@@ -138,19 +137,6 @@ def test_a_box_in_a_moving_grip_does_not_slip() -> None:
 
 
 # --- rest ------------------------------------------------------------------------------------------------------------
-
-
-class Together(Yard):
-    """All rigid bodies as one island."""
-
-    def step(self, ticks: int = 1) -> None:
-        everybody = tuple(self.layout.entities)
-        solved = tuple(entity.index for entity in everybody)
-        for _ in range(ticks):
-            work = Work(self.tick, self.layout, (everybody,), solved, self.numbers, {})
-            self.stepper.solve(self.engine, work)
-            self.tick += 1
-        assert self.stepper.quarantined == []
 
 
 PLANK: Final = {"shape": "box", "length": "8 m", "width": "4 m", "height": "20 cm", "z": "1 m"}

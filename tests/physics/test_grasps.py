@@ -23,7 +23,7 @@ from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
 from tests.forms.worlds import DEPLOY
-from tests.grip_yards import FRONT_M, LIFT_M, NAME, SIDE_M, crane, crate, porter, world
+from tests.grip_yards import FRONT_M, NAME, SIDE_M, crane, crate, porter, world
 
 GRAVITY: Final = 9.80665
 LEFT_M: Final = 1.0 - SIDE_M / 2
@@ -126,7 +126,7 @@ def test_it_slips_by_less_than_a_millimetre_in_half_a_minute_of_motion() -> None
         assert worst < SLIP_M_MAX and not made.quarantined
 
 
-def test_it_pushes_what_stands_in_its_way() -> None:
+def test_it_pushes_a_crate_in_its_way() -> None:
     with at_crate({"crate": crate(1.0), "other": crate(1.3, mass=1.0)}) as made:
         made.step({"a": {"gripper": (1.0,)}})
         made.step({"a": {"joints": (0.05, AT_IT[1])}}, ticks=100)
@@ -278,7 +278,7 @@ def test_what_a_holder_in_quarantine_held_falls() -> None:
         ({"at": {"link": "grip", "y": "12 cm"}, "reach": "5 cm"}, ""),
     ],
 )
-def test_what_fits_is_taken_and_a_job_says_why_another_is_not(gripper: dict[str, Any], why: str) -> None:
+def test_an_object_that_fits_is_taken_and_a_failed_job_has_the_reason(gripper: dict[str, Any], why: str) -> None:
     with at_crate({"crate": crate(1.0, tags=["crate"])}, **gripper) as made:
         jobs = Jobs(made.declared, "script", "a", "gripper")
         jobs.hear(made.readings)
@@ -465,12 +465,3 @@ BASE: Final = {"model": "holonomic", "actuators": {"grip": {"kind": "gripper"}}}
 def test_what_cannot_hold_is_refused(robots: dict[str, Any], more: dict[str, Any], expected: Sequence[str]) -> None:
     found = problem(robots, **more)
     assert all(text in found for text in expected), found
-
-
-def test_lift_is_the_height_of_the_hand() -> None:
-    """The world of these tests is what it says."""
-    with at_crate() as made:
-        poses = {name: place for name, place, _ in forward_kinematics(
-            made.scene.bodies["a"], made.frame.layout["a"], made.frame.numbers
-        )}  # fmt: skip
-        assert poses["a/grip"] == pytest.approx((LEFT_M - 0.01, 0.0, LIFT_M), abs=1e-3)

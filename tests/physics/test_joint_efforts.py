@@ -18,19 +18,6 @@ def efforts(one: Any) -> Any:
 
 
 @engines
-def test_a_saturated_drive_shows_its_limits(world: Make, engine: str) -> None:
-    """And they are what accelerates the rod: F = m a, tau = I alpha."""
-    one = world(f"engine={engine}", "table.gravity=0 m/s2")
-    for sign in (1.0, -1.0):
-        before = one.of(NAME, "joint_velocities", 2)
-        one.tick({NAME: ((1000.0 * sign, FORCE), (1000.0 * sign, TORQUE))}, ball=False)
-        gained = [after - start for after, start in zip(one.of(NAME, "joint_velocities", 2), before, strict=True)]
-        assert efforts(one) == [sign * FORCE, sign * TORQUE]
-        assert gained[0] / one.tick_s * one.rod_mass(NAME) == pytest.approx(efforts(one)[0], rel=1e-9)
-        assert gained[1] / one.tick_s * one.rod_inertia(NAME) == pytest.approx(efforts(one)[1], rel=1e-9)
-
-
-@engines
 @pytest.mark.parametrize("part", [0.25, 0.5])
 def test_a_drive_shows_what_it_needs_in_the_last_substep(world: Make, engine: str, part: float) -> None:
     """All before at its limits, and then a part of these."""
@@ -55,16 +42,6 @@ def test_at_rest_a_drive_holds_the_weight_of_the_figures(world: Make, engine: st
     weight = -link.mass * one.table.gravity * link.centre_of_mass[2] * sin(angle)
     assert efforts(one) == pytest.approx([0.0, weight], abs=1e-12)
     assert one.of(NAME, "joint_positions", 2) == pytest.approx([0.0, angle], abs=1e-12)
-
-
-@engines
-def test_a_drive_that_presses_against_its_stop_shows_its_limit(world: Make, engine: str) -> None:
-    one = world(f"engine={engine}")
-    one.set_rod(NAME, (one.table.lines["goal"].half_stroke, 0.0), (0.0, 0.0))
-    for _ in range(20):
-        one.tick({NAME: ((1.0, FORCE), (0.0, TORQUE))}, ball=False)
-    assert efforts(one) == [FORCE, 0.0]
-    assert one.of(NAME, "joint_velocities", 2)[0] == pytest.approx(0.0, abs=1e-9)
 
 
 @engines

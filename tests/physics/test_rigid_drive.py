@@ -9,9 +9,8 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.node.tick import Work
 from foosim.world.assembly.rest import REST_NS
-from tests.kinematic_yard import TICK_S, Yard, yard_text
+from tests.kinematic_yard import TICK_S, Together, yard_text
 
 GRAVITY: Final = 9.80665
 FRICTION: Final = 0.8 * 0.8
@@ -21,24 +20,12 @@ CASTER_M: Final = 0.25 - 0.02
 SUBSTEPS: Final = 4
 
 
-class Pushing(Yard):
-    """All rigid bodies as one island."""
-
-    def step(self, ticks: int = 1) -> None:
-        for _ in range(ticks):
-            everybody = self.layout.entities
-            solved = tuple(entity.index for entity in everybody)
-            self.stepper.solve(self.engine, Work(self.tick, self.layout, (tuple(everybody),), solved, self.numbers, {}))
-            self.tick += 1
-        assert self.stepper.quarantined == []
-
-
-def yard(sections: dict[str, Any] | None = None, **robot: Any) -> Pushing:
+def yard(sections: dict[str, Any] | None = None, **robot: Any) -> Together:
     bot = {"model": "differential_drive", "dynamics": "rigid", **robot}
-    return Pushing(yard_text({"bot": bot}, engine="mujoco", substeps=SUBSTEPS, **(sections or {})))
+    return Together(yard_text({"bot": bot}, engine="mujoco", substeps=SUBSTEPS, **(sections or {})))
 
 
-def told(one: Pushing, linear: float, angular: float, ticks: int) -> None:
+def told(one: Together, linear: float, angular: float, ticks: int) -> None:
     one.put("bot", "motion.set_point", linear, angular)
     one.step(ticks)
 
@@ -123,11 +110,11 @@ LEAST, MOST = traction(BLOCK_M), traction(0.02)
 """A bumper pushes somewhere between its lower edge and the height of the block."""
 
 
-def strong(mass: float) -> Pushing:
+def strong(mass: float) -> Together:
     return yard(block(mass), torque="30 N m", surface="frictionless", bumper="40 cm")
 
 
-def pushed(one: Pushing, ticks: int) -> float:
+def pushed(one: Together, ticks: int) -> float:
     """The mean force on the robot (N)."""
     total = 0.0
     for _ in range(ticks):
@@ -181,7 +168,7 @@ def test_it_rests_without_drift(is_driven: bool) -> None:
     assert one.vector("bot", "linear_velocity")[0] == pytest.approx(0.2 * one_ahead(one), abs=0.01)
 
 
-def one_ahead(one: Pushing) -> float:
+def one_ahead(one: Together) -> float:
     """The share of its way ahead that goes along x of the world."""
     _, y, z, _ = one.vector("bot", "orientation")
     return 1.0 - 2.0 * (y * y + z * z)

@@ -17,7 +17,8 @@ from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component
-from tests.physics.test_rod_drives import SEED, STILL, TABLE, TEXT, Driven
+from tests.deployed import TABLE, TEXT
+from tests.physics.test_rod_drives import SEED, STILL, Driven
 from tests.placing import place_ball
 
 TOUCH: Final = "robots.blue.midfield.sensors={touch: {kind: figure_contact, rate: 100 Hz}}"

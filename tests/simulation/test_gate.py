@@ -9,9 +9,8 @@ import pytest
 
 from foosim.node.core import NodeCore
 from tests.gate.direct import DIRECT, DirectMutant, Failed, run_all
-from tests.gate.mutants import MUTANTS
 from tests.gate.planting import Mutant
-from tests.gate.search import find
+from tests.gate.search import MUTANTS, find
 from tests.swarm.campaign import fly
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -223,6 +223,7 @@ class Laws:
 
     def _down(self, traced: Traced) -> None:
         down = decode_any(Go | Down, traced.payload)
+        hold(down.tick <= self.committed, f"downlink of tick {down.tick}, of which {self.committed} is committed")
         self.packets.downlink(traced.name, down, traced.payload)
 
     def _up(self, traced: Traced) -> None:

@@ -23,7 +23,8 @@ from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import find_component
-from tests.own_forms import TABLE, folder_on_path, written
+from tests.deployed import TABLE
+from tests.own_forms import folder_on_path, written
 
 SETS: Final = (
     "robots.rover01.sensors.place={kind: pose_3d, rate: 50 Hz, at: {x: 20 cm, z: 50 cm}}",

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import pi
-from pathlib import Path
 from typing import Final
 
 import pytest
 
 from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.deployment.processes import processes_of
 from foosim.library.mobile.hall_obstacles import obstacles_of, start_findings
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
 from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits
-from foosim.world.forms.registry import names
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.rays.outlines import Circle, Rectangle, outline
 from foosim.world.scene import Cylinder, Shape
 from foosim.world.setting.settable import add_edit, set_edits
+from tests.deployed import DEPLOY
 
-DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 WAREHOUSE: Final = (DEPLOY / "warehouse.yaml").read_text()
 TABLE: Final = (DEPLOY / "table.yaml").read_text()
 DEPLOYMENT: Final = load_deployment(WAREHOUSE, "warehouse.yaml")
@@ -45,25 +41,14 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.x=-1 m", "robots.rover01.x: the rover starts in scenery.shelf-north-outer-2, '-1 m, 9 m'"),
         ("robots.rover03.x=4 m", "robots.rover03.x: the rover starts in the rover rover01, '4 m, 6.5 m'"),
         ("robots.rover01.x=-17.1 m", "robots.rover01.x: the rover starts in the station base, '-17.1 m, 0 m'"),
-        ("robots.rover01.heading=90", "robots.rover01.heading: not an angle (a number and one of rad, mrad, deg), 90"),
-        ("robots.rover01.charge=120 %", "robots.rover01.charge: out of range 0 % to 100 %, '120 %'"),
-        ("robots.rover01.sensors.pose.kind=pos",
-         "robots.rover01.sensors.pose.kind: unknown sensor (there are: "
-         f"{', '.join(names('sensor'))}, or any module:Class), 'pos', nearest is 'pose'"),
         ("robots.rover01.sensors.pose={kind: ball, rate: 10 Hz}",
          "robots.rover01.sensors.pose.kind: sensor of a table in a world without one, 'ball'"),
         ("robots.rover01.actuators={drive: {kind: rod_position}}",
          "robots.rover01.actuators.drive.kind: actuator of a table in a world without one, 'rod_position'"),
         ("robots.base.sensors={cells: {kind: battery, rate: 1 Hz}}",
          "robots.base.sensors.cells.kind: on a robot without a battery: base has no rule battery, 'battery'"),
-        ("robots.rover01.sensors.proximity.rays=0",
-         "robots.rover01.sensors.proximity.rays: less than the least that is valid, 1, 0"),
-        ("robots.rover01.sensors.proximity.rays=360",
-         "robots.rover01.sensors.proximity.rays: more than the most that is valid, 128, 360"),
         ("robots.rover01.sensors.drive={kind: battery, rate: 1 Hz}",
          "robots.rover01.sensors: a name that is also one of rover01's actuators, 'drive'"),
-        ("robots.rover01.sensors.echo={kind: battery, rate: 1 Hz}",
-         "robots.rover01.sensors: a reserved name, 'echo'"),
         ("robots.base.heading=0 deg",
          "robots.base: unknown key (there are: model, spare, tags, sensors, actuators, rules, x, y), 'heading'"),
         ("scenery.goods-1.surface=floor",
@@ -72,11 +57,6 @@ def problems(text: str, *sets: str) -> list[str]:
         ("hall.rover.drive.track=70 cm",
          "hall.rover.drive.track: the wheels would be outside of the rover: more than twice its radius, '70 cm'"),
         ("hall.rover.battery.empty=30 V", "hall.rover.battery.empty: not below the full battery's voltage, '30 V'"),
-        ("hall.rover.battery.capacity=3 V",
-         "hall.rover.battery.capacity: not an energy (a number and one of J, kJ, Wh, kWh); V measures a voltage, "
-         "'3 V'"),
-        ("players.pilot01.process=west", "players.pilot01.process: a name that is also one of nodes, 'west'"),
-        ("players.pilot01.process=vhub", "players.pilot01.process: a reserved name, 'vhub'"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_with_its_place(
@@ -92,8 +72,6 @@ def test_what_does_not_fit_is_refused_with_its_place(
 @pytest.mark.parametrize(
     ("sets", "problem"),
     [
-        (["robots.rover01.x=30 m"], "robots.rover01.x: the rover starts outside of the hall: "
-         "valid are x from -20 to 20 m, y from -12.5 to 12.5 m, '30 m, 11.25 m'"),
         (["robots.base.y=20 m"], "robots.base.x: the station stands outside of the hall: "
          "valid are x from -20 to 20 m, y from -12.5 to 12.5 m, '-17.5 m, 20 m'"),
         (["robots.base.x=-19.9 m"], "robots.base.x: the station stands in a wall of the hall, '-19.9 m, 0 m'"),
@@ -101,25 +79,19 @@ def test_what_does_not_fit_is_refused_with_its_place(
          "robots.base.x: the station stands in scenery.pallet, '-17.5 m, 0 m'"),
     ],
 )  # fmt: skip
-def test_who_stands_in_something_or_outside_is_refused(
+def test_a_robot_in_an_obstacle_or_outside_is_refused(
     fleet_text: Callable[..., str], sets: list[str], problem: str
 ) -> None:
     assert problems(fleet_text(2), *sets)[0] == problem
 
 
-def test_stations_do_not_stand_in_one_another() -> None:
+def test_stations_do_not_overlap() -> None:
     second = DEPLOYMENT.robots["base"].model_copy(update={"x": -17.2})
     deployment = DEPLOYMENT.model_copy(update={"robots": {**DEPLOYMENT.robots, "second": second}})
     assert [(finding.location[1], finding.what) for finding in start_findings(deployment)] == [
         ("base", "the station stands in the station second"),
         ("second", "the station stands in the station base"),
     ]
-
-
-def test_a_process_has_its_players_on_one_host() -> None:
-    hosts = "hosts={a: {address: 10.0.0.1}, b: {address: 10.0.0.2}}"
-    found = problems(WAREHOUSE, hosts, "players.pilot01.host=a")
-    assert found[0] == "players.pilot01.process: a process whose roles are not all on the same host, 'fleet-west'"
 
 
 def test_robots_of_a_kit_need_its_section() -> None:
@@ -150,18 +122,6 @@ def test_rovers_start_where_they_are_declared() -> None:
     assert frame.at("rover03", "heading") == pytest.approx(-pi / 2)
     assert frame.vector("rover03", "orientation", 4) == pytest.approx([0.0, 0.0, -(0.5**0.5), 0.5**0.5])
     assert frame.at("rover03", "charge") == pytest.approx(0.95 * 250 * 3600)
-
-
-def test_each_rover_is_an_island_that_its_owner_solves() -> None:
-    layout, owners = build_layout(DEPLOYMENT), DEPLOYMENT.owners()
-    assignment = Assignment(layout, table_reach_of(DEPLOYMENT, layout), ["east", "west"], owners)
-    shares = assignment.shares(initial_numbers(DEPLOYMENT, layout))
-    for node, share in shares.items():
-        mine = [entity for entity in layout.entities if owners[entity.name] == node]
-        assert share.islands == tuple(
-            (entity.index,) for entity in mine if entity.model == "rover" and entity.name not in layout.spares
-        )
-        assert share.solved == tuple(entity.index for entity in mine)
 
 
 def test_the_scene_has_rovers_where_they_are_and_their_antennas() -> None:
@@ -207,13 +167,7 @@ def test_a_circle_is_clear_of_a_rectangle_from_where_it_touches(x: float, y: flo
         assert turned.is_clear(-side_y * y, side_x * x, 0.5) is clear
 
 
-def test_players_that_name_a_process_share_it(fleet_text: Callable[..., str]) -> None:
-    deployment = load_deployment(fleet_text(2, "players.pilot02.process=own"), "hall.yaml")
-    found = {name: process.roles for name, process in processes_of(deployment).items()}
-    assert found["fleet-west"] == ("dispatch", "pilot01") and found["own"] == ("pilot02",)
-
-
-def test_nobody_is_added_or_put_outside_of_the_hall() -> None:
+def test_no_robot_is_added_or_put_outside_of_the_hall() -> None:
     layout = build_layout(DEPLOYMENT)
     numbers = initial_numbers(DEPLOYMENT, layout)
     with pytest.raises(BadValue, match=r"beyond the bounds of the world: rover21 would .* '9999 m, 0 m, "):

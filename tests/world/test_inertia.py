@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foosim.common.errors import BadValue
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.world.bodies import urdf, urdf_links
 from foosim.world.bodies.hull import convex_hull
@@ -21,7 +20,6 @@ from foosim.world.bodies.inertia import (
     Principal,
     Tensor,
     about,
-    check_mass,
     check_moments,
     combined,
     placed,
@@ -64,7 +62,7 @@ def test_a_diagonal_tensor_has_its_own_moments_unturned() -> None:
     assert principal_of((2.0, 0.0, 0.0, 2.0, 0.0, 2.0)) == ((2.0, 2.0, 2.0), UPRIGHT)
 
 
-def test_equal_moments_with_products_of_inertia_are_told_apart() -> None:
+def test_equal_moments_with_products_of_inertia_are_distinguished() -> None:
     moments, axes = principal_of((2.0, 1.0, 0.0, 2.0, 0.0, 4.0))
     assert sorted(moments) == pytest.approx([1.0, 3.0, 4.0])
     assert np.allclose(turned((moments[0], 0.0, 0.0, moments[1], 0.0, moments[2]), axes), (2, 1, 0, 2, 0, 4))
@@ -122,30 +120,9 @@ def test_away_from_the_centre_a_mass_resists_more() -> None:
     assert turned((1.0, 0.0, 0.0, 2.0, 0.0, 3.0), quarter) == pytest.approx((2.0, 0.0, 0.0, 1.0, 0.0, 3.0), abs=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("moments", "what"),
-    [
-        ((0.0, 1.0, 1.0), r"moments of 0, 1 and 1 kg m2: each is above 0"),
-        ((-1.0, 1.0, 1.0), r"moments of -1, 1 and 1 kg m2: each is above 0"),
-        ((1.0, 1.0, 2.1), r"no body has one above the sum of both others, 2$"),
-        ((1e-9, 1e-9, 1e-9), r"of 1 kg: a radius of gyration of 3\.16\S+e-05 m, valid are 0\.0001 to 1000 m"),
-        ((1e7, 1e7, 1e7), r"a radius of gyration of 3162\.28 m"),
-    ],
-)
-def test_moments_that_no_body_has_are_refused_with_the_numbers(moments: Vector, what: str) -> None:
-    with pytest.raises(BadValue, match=what):
-        check_moments(1.0, moments)
-
-
 def test_a_thin_plate_whose_numbers_were_rounded_is_a_body() -> None:
     check_moments(1.0, (1.0, 1.0, 2.0))
     check_moments(1.0, (0.083, 0.083, 0.167))
-
-
-@pytest.mark.parametrize("mass", [0.0, -1.0, 1e-7, 1.1e6])
-def test_masses_that_no_robot_has_are_refused(mass: float) -> None:
-    with pytest.raises(BadValue, match=r"kg, valid are 1e-06 to 1e\+06 kg"):
-        check_mass(mass)
 
 
 # --- the same bits everywhere ----------------------------------------------------------------------------------------

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from math import dist, hypot
-from pathlib import Path
 from typing import Final
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.library.table.rod import RodRobot
 from foosim.library.table.settings import table_of
@@ -20,11 +18,9 @@ from foosim.world.assembly.islands import Assignment, islands_of, table_reach_of
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.forms.forms import ABSENT
 from foosim.world.layout import Layout, build_layout
+from tests.deployed import DEPLOYMENT, LAYOUT, deployed
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
-LAYOUT: Final = build_layout(DEPLOYMENT)
-SPARES: Final = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["table.spare_balls=2"]), TABLE.name)
+SPARES: Final = deployed("table.spare_balls=2")
 THREE: Final = build_layout(SPARES)
 """Three balls, of which two may be absent."""
 AXES: Final = {
@@ -142,7 +138,7 @@ def test_the_tick_makes_the_island_not_the_speed() -> None:
     for rod in LAYOUT.of("rod"):
         numbers[rod.offsets["joint_velocities"] + 1] = 200.0
     assert islands_of(numbers, reach, touching_of(numbers, reach)) == at_rest
-    slower = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, ["tick=10 ms", "substeps=20"]), TABLE.name)
+    slower = deployed("tick=10 ms", "substeps=20")
     assert len(islands(LAYOUT, {"ball": (0.1, 0.0, RADIUS)}, slower)) < len(at_rest)
 
 

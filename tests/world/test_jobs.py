@@ -83,7 +83,7 @@ def target(simulation: Simulation) -> tuple[float, ...]:
 # --- one after the other ---------------------------------------------------------------------------------------------
 
 
-def test_a_new_job_preempts_whosever_runs() -> None:
+def test_a_new_job_preempts_any_running_one() -> None:
     with yard() as its:
         assert known(its) == [(0, NONE), (0, NONE)]
         assert tell(its, (ANN, 1.0)) == [(1, RUNNING), (0, NONE)]
@@ -92,14 +92,6 @@ def test_a_new_job_preempts_whosever_runs() -> None:
         assert running(its) == 2
         assert tell(its, (BEN, 5.0)) == [(1, PREEMPTED), (5, RUNNING)]
         assert target(its) == (15.0, 2.0)
-
-
-def test_a_repeat_does_nothing_however_late() -> None:
-    with yard() as its:
-        tell(its, (ANN, 2.0), (BEN, 1.0))
-        assert tell(its, (ANN, 2.0), (ANN, 1.0), (BEN, 1.0)) == [(2, PREEMPTED), (1, RUNNING)]
-        assert target(its) == (11.0, 2.0)
-        assert its.frame.at("base", "refused") == 0.0
 
 
 def test_only_its_owner_cancels() -> None:
@@ -111,7 +103,7 @@ def test_only_its_owner_cancels() -> None:
         assert tell(its, (ANN, -1.0), (ANN, 1.0)) == [(1, CANCELLED), (1, CANCELLED)]
 
 
-def test_a_plain_command_is_nobodys_job() -> None:
+def test_a_plain_command_is_no_job() -> None:
     with yard() as its:
         tell(its, (ANN, 1.0))
         assert tell(its, (BEN, 0.0)) == [(1, PREEMPTED), (0, NONE)]
@@ -207,7 +199,7 @@ def test_a_delayed_job_begins_later_and_is_still_its_senders() -> None:
 # --- what is told of it ----------------------------------------------------------------------------------------------
 
 
-def test_the_sensor_speaks_when_something_changes() -> None:
+def test_the_sensor_sends_at_each_change() -> None:
     """At its rate there is a reading each 100 ticks; and one more for each tick in which something has changed."""
 
     def readings() -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import cos, hypot, pi, sin, sqrt
 from typing import Any, Final
 
+import numpy as np
 import pytest
 
 from foosim.library.mobile.v_w import Motion
@@ -12,9 +13,8 @@ from foosim.library.mobile.waypoint import Waypoint
 from foosim.library.mobile.wheel_speeds import Drive
 from foosim.library.mobile.wheels import slips_of, wheels_of
 from foosim.library.mobile.x_y_w import Velocity
-from foosim.world.assembly.world import TOGETHER_MIN
 from foosim.world.components.fitted import actuators_of, sensors_of
-from foosim.world.components.view import ComponentError, View, WritableView, has_together
+from foosim.world.components.view import View, WritableView, has_together
 from tests.kinematic_yard import TICK_S, Yard, drawn, yard_text
 
 QUICK: Final = {"acceleration": "100 m/s2"}
@@ -125,6 +125,11 @@ def test_a_wheel_that_slips_rolls_less_far_than_it_turns() -> None:
     assert yard.vector("r", "wheel_travel")[0] == pytest.approx(0.005)
     x, y, _ = yard.vector("r", "position")
     assert hypot(x, y) == pytest.approx(0.005 * (1 - sum(slips) / 2), rel=1e-6)
+    assert yard.vector("r", "heading")[0] == pytest.approx(0.005 * (slips[0] - slips[1]) / 0.4), "the right is slower"
+    drawn_slips = np.array([slips_of(yard.deployment, f"r{number}", 0.2) for number in range(1000)])
+    for wheel in drawn_slips.T:
+        assert wheel.mean() == pytest.approx(0.1, abs=3.29 * 0.2 / sqrt(12 * 1000)) and 0.198 < wheel.max() < 0.2
+    assert abs(np.mean((drawn_slips[:, 0] - 0.1) * (drawn_slips[:, 1] - 0.1)) * 300) < 3.29 / sqrt(1000), "of its own"
 
 
 @pytest.mark.parametrize("draw", range(6))
@@ -229,28 +234,7 @@ def test_a_zone_counts_who_is_in_it(shape: dict[str, Any]) -> None:
     assert (yard.vector("world", "goal.count"), yard.vector("world", "goal.all_in")) == ([3.0], [1.0])
 
 
-@pytest.mark.parametrize("kind", ["v_w", "wheel_speeds"])
-def test_drives_that_are_asked_together_have_the_bits_of_each_alone(kind: str) -> None:
-    """Whichever of the robots there are, in whatever order."""
-    robot = {"model": "differential_drive", "actuators": {"motion": {"kind": kind}}}
-    robots = {
-        f"r{n}": {**robot, "at": {"x": f"{n} m"}, "speed": f"{1 + n / 10} m/s", "track": f"{20 + n / 2} cm"}
-        for n in range(TOGETHER_MIN + 3)
-    }
-    yard = Yard(yard_text(robots))
-    for n, name in enumerate(robots):
-        yard.put(name, "motion.set_point", *drawn(name, n, (4.0, 8.0)))
-    world = yard.stepper.world
-    view = View(0, yard.numbers)
-    alone = world.motors(yard.layout.robots, view)
-    for some in (slice(None, None, -1), slice(3, None), slice(None)):
-        ((_, _, together),) = world._moving_of(yard.layout.robots[some]).groups
-        assert together.command(view).tolist() == [[list(motor) for motor in motors] for motors in alone[some]]
-    at_limit = sum(max(abs(target) for target, _ in motors) > 0.999 * (1 + n / 10) for n, motors in enumerate(alone))
-    assert at_limit > 3 or kind == "wheel_speeds"
-
-
-def test_a_class_with_a_command_of_its_own_is_not_asked_by_what_it_inherits() -> None:
+def test_a_class_with_a_command_of_its_own_is_not_computed_by_its_base() -> None:
     """`together` computes what `command` of its own class does."""
 
     class Base:
@@ -271,15 +255,3 @@ def test_a_class_with_a_command_of_its_own_is_not_asked_by_what_it_inherits() ->
 
     asked = [has_together(kind, "command") for kind in (Base, Same, Other, Both, int)]
     assert asked == [True, True, False, True, False]
-
-
-def test_an_array_that_is_none_of_all_drives_names_them() -> None:
-    yard = Yard(
-        yard_text({f"r{n}": {"model": "differential_drive", "at": {"x": f"{n} m"}} for n in range(TOGETHER_MIN)})
-    )
-    moving = yard.stepper.world._moving_of(yard.layout.robots)
-    ((_, _, together),) = moving.groups
-    together._at_rest = together._at_rest[1:]
-    yard.stepper.world._moving = moving
-    with pytest.raises(ComponentError, match="actuators of the motion WheeledMotion failed at tick 0"):
-        yard.step()

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
-from foosim.library.table.table import BALL
+from foosim.simulation.simulation import read_for_stepping
 from foosim.world.components.view import Mounting
 from foosim.world.forms.forms import ABSENT
-from foosim.world.forms.registry import find_model, names
-from foosim.world.layout import NOTHING, WORLD, Carried, Declared, Layout, build_layout
-
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
-LAYOUT: Final = build_layout(DEPLOYMENT)
+from foosim.world.layout import NOTHING, Carried, Declared, Layout, build_layout
+from tests.deployed import DEPLOY, DEPLOYMENT, LAYOUT, deployed
 
 models = st.dictionaries(
     st.text("abcdefgh.-_0123456789", min_size=1, max_size=8), st.sampled_from(["ball", "rod", "camera", "rover"])
@@ -61,7 +56,7 @@ def test_slots_follow_each_other_in_name_order(models: dict[str, str], data: st.
 
 
 def with_spares(count: int) -> Deployment:
-    return load_deployment(apply_sets(TABLE.read_text(), TABLE.name, [f"table.spare_balls={count}"]), TABLE.name)
+    return deployed(f"table.spare_balls={count}")
 
 
 def test_spares_are_in_the_layout_from_the_start_and_the_ball_never_leaves() -> None:
@@ -71,36 +66,19 @@ def test_spares_are_in_the_layout_from_the_start_and_the_ball_never_leaves() -> 
     assert [entity.name for entity in LAYOUT.entities if entity.can_leave] == ["ball-2", "ball-3"]
 
 
-def test_the_table_has_its_entities() -> None:
-    assert set(LAYOUT.names) == {BALL, *LAYOUT.spares, WORLD, *DEPLOYMENT.robots}
-    assert [entity.name for entity in LAYOUT.of("rod")] == sorted(
-        name for name in DEPLOYMENT.robots if name != "camera"
-    )
-    assert [entity.name for entity in LAYOUT.robots] == sorted(DEPLOYMENT.robots)
-    assert [entity.name for entity in LAYOUT.of("ball")] == [BALL, "ball-2", "ball-3"]
-    assert {entity.name for entity in LAYOUT.entities if not entity.is_solved} == {WORLD, "camera"}
-    models = [find_model(name) for name in names("model")]
-    assert {model.name for model in models if model.is_solved and model.is_robot and model.kit} == {"rod", "rover"}
-    assert find_model("ball").can_be_free and not find_model("ball").is_robot
-    assert {model.name for model in models if model.actuators and model.kit} == {"rod", "rover"}
-    assert "ball" in LAYOUT and "nobody" not in LAYOUT and LAYOUT["camera"].model == "camera"
-
-
-def test_what_the_owner_writes_is_the_memory_of_sensors() -> None:
-    for entity in LAYOUT.entities:
-        owned = [field for field, at in entity.offsets.items() if at >= entity.split]
-        sensors = DEPLOYMENT.robots[entity.name].sensors if entity.is_robot else {}
-        delayed = ["ball.delay.values", "ball.delay.ticks"] if entity.name == "camera" else []
-        assert owned == [*delayed, *(f"{channel}.samples" for channel in sorted(sensors))]
-        assert all(entity.counts[field] == 1 for field in owned if field not in delayed)
-
-
-def test_what_an_actuator_remembers_is_the_solvers() -> None:
-    for rod in LAYOUT.of("rod"):
-        held = [field for field in rod.offsets if "." in field and rod.offsets[field] < rod.split]
-        assert held == ["position.set_point"] and rod.counts["position.set_point"] == 2
-        assert LAYOUT.components(rod.name) == ["encoder", "position"]
-    assert LAYOUT.components("camera") == ["ball"] and LAYOUT.components(BALL) == []
+@pytest.mark.parametrize("name", ["table", "table_sensors", "warehouse", "yard"])
+def test_the_owner_writes_what_sensors_remember_and_the_solver_what_actuators_do(name: str) -> None:
+    deployment = read_for_stepping(DEPLOY / f"{name}.yaml")
+    layout = build_layout(deployment)
+    assert {*layout.names} >= {*deployment.robots} and [one.name for one in layout.robots] == sorted(deployment.robots)
+    for robot in layout.robots:
+        its = deployment.robots[robot.name]
+        assert layout.components(robot.name) == sorted([*its.sensors, *its.actuators])
+        for slot, at in robot.offsets.items():
+            channel, _, what = slot.partition(".")
+            if what and channel not in its.rules:
+                assert (channel in its.sensors) == (at >= robot.split), slot
+        assert {f"{channel}.samples" for channel in its.sensors} <= {*robot.offsets}
 
 
 SENSOR: Final = "{kind: encoder, rate: 100 Hz}"
@@ -108,7 +86,7 @@ SLIDE: Final = "{kind: rod_position}"
 
 
 def laid_out(*sets: str) -> Layout:
-    return build_layout(load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name))
+    return build_layout(deployed(*sets))
 
 
 def test_the_order_in_which_components_are_named_is_nothing() -> None:
@@ -168,14 +146,14 @@ def test_every_difference_has_another_digest() -> None:
 
 def test_a_layout_does_not_know_who_computes_it() -> None:
     sets = ["nodes={one: {robots: [" + ", ".join(DEPLOYMENT.robots) + "]}}", "seed=9", "tick=5 ms"]
-    other = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name)
+    other = deployed(*sets)
     assert build_layout(other).digest == LAYOUT.digest
 
 
 def test_a_slot_of_a_rule_is_not_that_of_a_sensor_of_its_name() -> None:
     """Nor may the sensor write it: what is the solver's is no owner's."""
     sets = ["robots.red.goal.rules={}", "robots.red.goal.sensors.wear={kind: encoder, rate: 100 Hz}"]
-    deployment = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, sets), TABLE.name)
+    deployment = deployed(*sets)
     layout = build_layout(deployment)
     rod = layout["red.goal"]
     solvers = {**rod.offsets, "wear.contacts": rod.offsets["contacts"]}

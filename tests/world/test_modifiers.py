@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.edited_frame import edit
 from foosim.node.tick import Stepper
 from foosim.world.assembly.world import initial_numbers
@@ -24,9 +23,10 @@ from foosim.world.edits import Set
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered
+from tests.deployed import deployed
+from tests.kinematic_yard import Yard, yard_text
+from tests.own_forms import folder_on_path, written
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT: Final = TABLE.read_text()
 ENCODER: Final = "robots.red.goal.sensors.encoder"
 PERIOD: Final = 5
 """Ticks between two readings of an encoder."""
@@ -39,7 +39,7 @@ class Rod:
         sets = [f"{ENCODER}.modifiers={modifiers}"]
         if of == "actuator":
             sets = [f"robots.red.goal.actuators={{position: {{kind: rod_position, modifiers: {modifiers}}}}}"]
-        self.deployment = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name)
+        self.deployment = deployed(*sets)
         self.layout = build_layout(self.deployment)
         self.entity = self.layout["red.goal"]
         self.numbers = initial_numbers(self.deployment, self.layout)
@@ -156,7 +156,7 @@ def test_a_bias_begins_with_its_draw_and_walks_as_far_as_it_says() -> None:
 
 def test_another_frame_has_points_moved_and_turned() -> None:
     sets = ["robots.camera.sensors.ball.modifiers=[{kind: frame_change, x: 1 m, y: 2 m, z: 3 m, yaw: 90 deg}]"]
-    deployment = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name)
+    deployment = deployed(*sets)
     layout = build_layout(deployment)
     numbers = initial_numbers(deployment, layout)
     at = layout["ball"].offsets["position"]
@@ -165,6 +165,16 @@ def test_another_frame_has_points_moved_and_turned() -> None:
     (payload,) = Sensing().sample([camera], SensingView(0, numbers))
     assert payload is not None
     assert struct.unpack("<3d", payload) == pytest.approx((0.25, -0.5, 0.125))
+
+
+@pytest.mark.parametrize(("heading", "turned"), [(1.0, 1.0 - pi / 6), (-3.0, 11 * pi / 6 - 3.0), (0.0, -pi / 6)])
+def test_another_frame_has_headings_turned_back_and_within_half_a_turn(heading: float, turned: float) -> None:
+    pose = {"kind": "pose", "rate": "100 Hz", "modifiers": [{"kind": "frame_change", "yaw": "30 deg"}]}
+    yard = Yard(yard_text({"r": {"model": "holonomic", "sensors": {"pose": pose}}}))
+    yard.put("r", "heading", heading)
+    (one,) = sensors_of(yard.deployment, yard.layout, yard.layout["r"])
+    (payload,) = Sensing().sample([one], SensingView(0, yard.numbers))
+    assert payload is not None and struct.unpack("<3d", payload)[2] == pytest.approx(turned)
 
 
 def test_modifiers_work_in_their_order_and_one_of_a_kind_is_not_the_other() -> None:
@@ -179,51 +189,15 @@ def test_modifiers_work_in_their_order_and_one_of_a_kind_is_not_the_other() -> N
     assert len({*first} & {*both}) == 0
 
 
-FAILING: Final = '''
-from msgspec import Struct
-
-from foosim.world.forms.quantities import Metres
-from foosim.world.components.base import Sensor
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
-
-
-class Settings(SensorSettings):
-    """Fails somehow."""
-
-    how: str
-
-
-class Reading(Struct, frozen=True):
-    x: Metres
-
-
-@sensor("failing", Settings, Reading)
-class Failing(Sensor):
-    """Fails."""
-
-    def __init__(self, settings, at):
-        self.how = settings.how
-        self.joints = at.slot("joint_positions")
-        if self.how == "made":
-            raise ValueError("not like this")
-
-    def sample(self, view):
-        if self.how == "writes" and view.tick >= 50:
-            view.write(self.joints, 1.0, 2.0)
-        if self.how == "raises" and view.tick >= 50:
-            raise ValueError("no more")
-        return Reading(float("nan") if self.how == "nan" and view.tick >= 50 else 1.0)
-'''
-
-
-def test_a_reading_that_is_not_finite_is_said_once_and_not_sent(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "failing_sensor.py").write_text(FAILING)
-    monkeypatch.syspath_prepend(tmp_path)
-    own = "robots.red.goal.sensors.own={kind: 'failing_sensor:Failing', rate: 100 Hz, how: nan}"
-    deployment = load_deployment(apply_sets(TEXT, TABLE.name, [own]), TABLE.name)
+def test_a_non_finite_reading_is_counted_and_not_sent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(
+        folder_on_path(tmp_path, monkeypatch),
+        "class Failing(Sensor):",
+        "    def __init__(self, settings, at): pass",
+        "    def sample(self, view): return Number(float('nan') if view.tick >= 50 else 1.0)",
+        "sensor('failing', Settings, Number)(Failing)",
+    )
+    deployment = deployed("robots.red.goal.sensors.own={kind: 'own_form:Failing', rate: 100 Hz}")
     layout = build_layout(deployment)
     stepper, values = Stepper(deployment, layout), np.array(initial_numbers(deployment, layout))
     sent = [

@@ -13,10 +13,10 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.report import PROBLEMS_MAX
 from foosim.world.clearance.overlaps import FOUND_MAX
+from tests.deployed import DEPLOY
 from tests.kinematic_yard import yard_text
 from tests.world.test_mesh import CUBE
 
-DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 QUAD: Final = {"quad": {"model": "quadrotor", "at": {"y": "9 m", "z": "1 m"}}}
 ARM: Final = {"model": "urdf", "file": "arm.urdf", "fixed": True}
 TOUCHING: Final = "(up to 1 mm is touching)"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from math import inf, nan
-from pathlib import Path
 from typing import Final
 
 import pytest
@@ -12,20 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foosim.common.errors import Malformed
-from foosim.deployment.loader import load_deployment
 from foosim.library.table.rod_position import ANGLE_RAD_MAX, Command, PositionActuator
 from foosim.library.table.settings import table_of
 from foosim.node.tick import Stepper
 from foosim.world.assembly.world import body_of, initial_numbers
 from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.components.view import View, WritableView
-from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered
 from foosim.world.scene import load_of
+from tests.deployed import DEPLOYMENT, LAYOUT
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
-LAYOUT: Final = build_layout(DEPLOYMENT)
 ROD: Final = LAYOUT["red.goal"]
 STROKE: Final = table_of(DEPLOYMENT).lines["goal"].half_stroke
 DRIVE: Final = table_of(DEPLOYMENT).drive
@@ -71,7 +66,7 @@ OUT_OF_REACH: Final[dict[str, bytes]] = {
 
 
 @pytest.mark.parametrize("what", MALFORMED)
-def test_what_is_no_command_is_refused_counted_and_changes_nothing(what: str) -> None:
+def test_a_malformed_command_is_refused_counted_and_changes_nothing(what: str) -> None:
     """The codec refuses what is none, before the actuator sees it."""
     numbers = initial_numbers(DEPLOYMENT, LAYOUT)
     assert takes(Command(0.05, 1.0), numbers) and wanted(numbers) == (0.05, 1.0)

@@ -17,8 +17,8 @@ from foosim.world.layout import build_layout
 from foosim.world.matter.materials import MATERIALS, METAL, PLASTIC, UNKNOWN, WOOD, MaterialName, RadioMaterial
 from foosim.world.mesh_files import is_closed, read_mesh
 from foosim.world.scene import Cylinder
+from tests.deployed import TEXT
 
-TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 POST: Final = "shape: cylinder, radius: 1 cm, length: 20 cm, z: 1 m, surface: walls"
 NAMES: Final = "concrete, brick, plasterboard, wood, glass, chipboard, metal"
 SIMPLEX: Final = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n"
@@ -70,7 +70,7 @@ def test_a_setting_takes_what_a_file_takes() -> None:
         ("[wood]", "radio: not a mapping, a list of 1"),
     ],
 )  # fmt: skip
-def test_what_is_no_material_is_refused_with_its_place(radio: str, problem: str) -> None:
+def test_an_invalid_material_is_refused_with_its_place(radio: str, problem: str) -> None:
     text = with_radio(radio)
     with pytest.raises(DeploymentError) as refusal:
         load_deployment(text, "t")

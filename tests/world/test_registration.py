@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import pytest
 
@@ -15,10 +13,8 @@ from foosim.deployment.validate import models_of
 from foosim.world.forms import registry
 from foosim.world.forms.registry import find, find_model
 from foosim.world.layout import build_layout
-from tests.own_forms import folder_on_path, problems, written
-
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT: Final = TABLE.read_text()
+from tests.deployed import TEXT
+from tests.own_forms import folder_on_path, fresh, install, problems, written
 
 
 @pytest.fixture
@@ -147,7 +143,7 @@ def test_a_model_has_the_fields_that_foosim_needs(site: Path, about: str, fields
     assert [*find_model("own_form:Own").fields_of(None, None)] == fields
 
 
-def test_a_model_is_the_variant_that_its_settings_ask_for(site: Path) -> None:
+def test_a_model_is_the_variant_of_its_settings(site: Path) -> None:
     settings = ("class Moved(RobotSettings):", "    dynamics: str = 'none'", "")
     about = "slots={'x': 1}, variants={'rigid': {'is_rigid': True, 'slots': {'y': 2}}}"
     written(site, *settings, f"model('own', Moved, {about})(Own)")
@@ -183,25 +179,10 @@ print(json.dumps([find("sensor", "encoder").module, find("sensor", "own").module
     assert told.startswith("cannot be imported: RuntimeError: at import (own_broken.py:")
 
 
-def fresh(code: str, folder: Path) -> Any:
-    """Return what a new process, with a folder on its path, prints as JSON."""
-    import os
-    import subprocess
-
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-def test_why_a_package_could_not_be_imported_is_said_of_each_form(site: Path) -> None:
+def test_an_import_error_of_a_package_is_in_the_message_of_each_type(site: Path) -> None:
     """A model, kit or engine that is unknown may be in it."""
     written(site, "raise RuntimeError('at import')")
-    about = site / "worn-0.3.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: worn\nVersion: 0.3\n")
-    (about / "entry_points.txt").write_text("[foosim.world]\nform = own_form\n")
-    registry._entry_points.cache_clear()
+    install(site, "worn", "0.3", "own_form")
     line = len((site / "own_form.py").read_text().splitlines())
     why = f"own_form of worn 0.3 cannot be imported: RuntimeError: at import (own_form.py:{line})"
     robots = ", ".join(model.name for model in models_of(robots=True))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Mapping
 from math import nan
@@ -23,13 +21,11 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings
-from foosim.world.forms import registry
 from foosim.world.forms.per_field import codec_of
 from foosim.world.forms.registry import FORMS, find, find_component, names
 from foosim.world.frame import Frame
-
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-TEXT: Final = TABLE.read_text()
+from tests.deployed import TABLE, TEXT, deployed
+from tests.own_forms import fresh, install, problems
 
 GAUGES: Final = '''
 from typing import Annotated
@@ -52,10 +48,12 @@ class ReachSettings(SensorSettings):
 
 
 class Reach(Struct, frozen=True):
-    """How far a rod is out, and when that was."""
+    """How far a rod is out, and when that was, in numbers and in words."""
 
     slide: Metres
     tick: float
+    text: str
+    ticks: list[int]
 
 
 @sensor("reach", ReachSettings, Reach, needs=("joint_positions",))
@@ -63,42 +61,15 @@ class ReachGauge(Sensor):
     """The slide of a rod, scaled."""
 
     def __init__(self, settings, at):
-        self._joints, self._scale = at.slot("joint_positions"), settings.scale
+        self._joints, self._scale, self._name = at.slot("joint_positions"), settings.scale, at.robot.name
 
     def sample(self, view):
-        return Reach(self._scale * view.read(self._joints)[0], float(view.tick))
+        slide = self._scale * view.read(self._joints)[0]
+        return Reach(slide, float(view.tick), f"{self._name} at {view.tick} \u2713", [view.tick, -1])
 
 
 class Idle:
     """Nobody registers it."""
-'''
-TELLERS: Final = '''
-from msgspec import Struct
-
-from foosim.world.forms.settings import SensorSettings
-from foosim.world.forms.quantities import Metres
-from foosim.world.components.base import Sensor
-from foosim.world.forms.registry import sensor
-
-
-class Told(Struct, frozen=True):
-    """In words."""
-
-    text: str
-    slide: Metres
-    ticks: list[int]
-
-
-@sensor("teller", SensorSettings, Told, needs=("joint_positions",))
-class Teller(Sensor):
-    """Says where a rod is."""
-
-    def __init__(self, settings, at):
-        self._joints, self._name = at.slot("joint_positions"), at.robot.name
-
-    def sample(self, view):
-        slide = view.read(self._joints)[0]
-        return Told(f"{self._name} at {slide:.3f} m \\u2713", slide, [view.tick, -1])
 '''
 WINCH: Final = '''
 from typing import Annotated
@@ -170,7 +141,6 @@ class Listener(Player):
 '''
 MODULES: Final = {
     "own_gauges": GAUGES,
-    "own_tellers": TELLERS,
     "own_winch": WINCH,
     "own_listener": LISTENER,
     "own_broken": "def begin():\n    return 1 / 0\n\nbegin()\n",
@@ -196,16 +166,6 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def install(folder: Path, name: str, *modules: str, version: str = "1.2") -> None:
-    """Leave in a folder what pip leaves there of a package whose entry points are modules in the folder."""
-    about = folder / f"{name}-{version}.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
-    entries = "\n".join(f"{module.removeprefix('own_')} = {module}" for module in modules)
-    (about / "entry_points.txt").write_text(f"[foosim.world]\n{entries}\n")
-    registry._entry_points.cache_clear()
-
-
 BEGIN: Final = """
 import json, sys
 from foosim.common.errors import Refused
@@ -220,22 +180,15 @@ def said(form, kind):
 """
 
 
-def fresh(code: str, folder: Path | None = None) -> Any:
-    """Return what a new process, with a folder on its path, prints as JSON."""
-    path = {} if folder is None else {"PYTHONPATH": str(folder)}
-    done = subprocess.run(
-        [sys.executable, "-c", BEGIN + code], capture_output=True, text=True, check=False, env={**os.environ, **path}
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout, "it ended without a word"
-    return json.loads(done.stdout)
+def printed(code: str, folder: Path | None = None) -> Any:
+    return fresh(BEGIN + code, folder)
 
 
 # --- foosim's own ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_each_stands_in_a_module_of_its_name_and_says_what_it_is(form: str) -> None:
+def test_each_is_in_a_module_of_its_name_and_has_a_summary(form: str) -> None:
     for name in names(form):
         component = find(form, name)
         assert (component.type_name, component.name, component.module.rpartition(".")[2]) == (form, name, name)
@@ -250,7 +203,7 @@ found = find("sensor", "encoder").module
 modules = [name for name in sys.modules if name.count(".") == 3 and name.startswith("foosim.library.")]
 print(json.dumps([found, modules, "numpy" in sys.modules]))
 """
-    assert fresh(code) == ["foosim.library.table.encoder", ["foosim.library.table.encoder"], False]
+    assert printed(code) == ["foosim.library.table.encoder", ["foosim.library.table.encoder"], False]
 
 
 @pytest.mark.parametrize(
@@ -266,7 +219,7 @@ print(json.dumps([found, modules, "numpy" in sys.modules]))
         ("actuator", "wheel_speed", ", nearest is 'wheel_speeds'"),
     ],
 )
-def test_an_unknown_name_says_what_there_is_and_the_nearest(form: str, kind: str, nearest: str) -> None:
+def test_an_unknown_name_is_refused_with_the_names_and_the_nearest(form: str, kind: str, nearest: str) -> None:
     with pytest.raises(UnknownName) as error:
         find(form, kind)
     there = ", ".join(names(form))
@@ -310,7 +263,7 @@ REFUSED: Final = {
 
 @pytest.mark.usefixtures("site")
 @pytest.mark.parametrize("path", REFUSED)
-def test_a_path_that_leads_to_no_component_says_why(path: str) -> None:
+def test_a_path_without_a_component_is_refused_with_the_reason(path: str) -> None:
     try:
         with pytest.raises(BadValue) as error:
             find("sensor", path)
@@ -320,7 +273,7 @@ def test_a_path_that_leads_to_no_component_says_why(path: str) -> None:
 
 
 @pytest.mark.usefixtures("site")
-def test_a_missing_class_names_those_that_there_are() -> None:
+def test_a_missing_class_is_refused_with_the_nearest() -> None:
     with pytest.raises(
         BadValue,
         match=r"there is no ReachGuage in own_gauges .*'own_gauges:ReachGuage', nearest is 'own_gauges:ReachGauge'",
@@ -350,20 +303,20 @@ def test_a_name_of_foosims_own_is_not_taken_whichever_comes_first(site: Path, fi
     """Which class a name means must not hang on what a process happened to import before."""
     (site / "own_thief.py").write_text(THIEF)
     second = {"encoder": "own_thief:ReachGauge", "own_thief:ReachGauge": "encoder"}[first]
-    told = fresh(f'print(json.dumps([said("sensor", {first!r}), said("sensor", {second!r})]))', site)
+    told = printed(f'print(json.dumps([said("sensor", {first!r}), said("sensor", {second!r})]))', site)
     both = ("own_thief", "foosim.library.table.encoder")
     assert any(all(word in text for word in both) for text in told), told
-    assert fresh('print(json.dumps(said("sensor", "encoder")))', site) == "foosim.library.table.encoder"
+    assert printed('print(json.dumps(said("sensor", "encoder")))', site) == "foosim.library.table.encoder"
 
 
-def test_a_package_that_takes_a_name_of_foosims_own_hurts_nobody_else(site: Path) -> None:
+def test_a_package_that_takes_a_name_of_foosim_changes_no_other_component(site: Path) -> None:
     (site / "own_thief.py").write_text(THIEF)
-    install(site, "thief", "own_thief")
+    install(site, "thief", "1.2", "own_thief")
     code = """
 told = [said("sensor", kind) for kind in ("encodr", "encoder", "pose")]
 print(json.dumps([told, names("sensor")]))
 """
-    (unknown, encoder, pose), there = fresh(code, site)
+    (unknown, encoder, pose), there = printed(code, site)
     assert (encoder, pose) == ("foosim.library.table.encoder", "foosim.library.generic.pose")
     assert unknown.startswith("UnknownName: unknown sensor") and unknown.endswith("'encodr', nearest is 'encoder'")
     assert all(word in unknown for word in ("own_thief of thief 1.2", "foosim.library.table.encoder"))
@@ -380,7 +333,7 @@ def test_keys_of_any_name_beside_an_unknown_kind_are_no_more_than_that(key: str)
 
 
 def test_a_package_gives_its_components_by_name(site: Path) -> None:
-    install(site, "gauges", "own_gauges", "own_winch")
+    install(site, "gauges", "1.2", "own_gauges", "own_winch")
     assert "own_gauges" not in sys.modules
     assert find("sensor", "reach").module == "own_gauges"
     assert find("actuator", "winch").module == "own_winch"
@@ -389,14 +342,14 @@ def test_a_package_gives_its_components_by_name(site: Path) -> None:
 
 
 def test_a_package_is_not_imported_for_what_is_foosims_own(site: Path) -> None:
-    install(site, "gauges", "own_gauges")
+    install(site, "gauges", "1.2", "own_gauges")
     code = 'print(json.dumps([said("sensor", "encoder"), "own_gauges" in sys.modules]))'
-    assert fresh(code, site) == ["foosim.library.table.encoder", False]
+    assert printed(code, site) == ["foosim.library.table.encoder", False]
 
 
 def test_the_schema_for_editors_has_what_is_installed(site: Path) -> None:
     before = deployment_schema()
-    install(site, "own", "own_gauges", "own_winch")
+    install(site, "own", "1.2", "own_gauges", "own_winch")
     assert deployment_schema() == before, "the one that is kept has foosim's own"
     reach = "robots.red.goal.sensors.own={kind: reach, rate: 100 Hz"
     winch = "robots.red.goal.actuators={own: {kind: winch"
@@ -441,7 +394,6 @@ def data_of(text: str) -> Any:
 # --- a deployment with them ------------------------------------------------------------------------------------------
 
 REACH: Final = "robots.red.goal.sensors.reach={kind: 'own_gauges:ReachGauge', rate: 100 Hz, scale: 2.0}"
-TELLER: Final = "robots.red.attack.sensors.words={kind: 'own_tellers:Teller', rate: 50 Hz}"
 WINCH_OF_GOAL: Final = "robots.red.goal.actuators={turn: {kind: 'own_winch:Winch', most: 20.0}}"
 
 
@@ -473,14 +425,14 @@ def rehearsed(*sets: str, nodes: int = 1, capture: Path | None = None) -> tuple[
 def test_readings_of_a_sensor_of_ones_own_reach_a_player_and_the_capture(tmp_path: Path) -> None:
     hears = listens({"red.goal": ["reach"]}, {"red.goal": 15.0})
     done, frames = rehearsed(REACH, WINCH_OF_GOAL, hears, capture=tmp_path / "run.mcap")
-    deployment = load_deployment(apply_sets(TEXT, TABLE.name, [REACH]), TABLE.name)
+    deployment = deployed(REACH)
     heard = sys.modules["own_listener"].Listener.heard["red.goal", "reach"]
     assert len(heard) >= 5
     for sent_ns, value in heard.items():
         assert type(value) is sys.modules["own_gauges"].Reach
         tick = sent_ns // deployment.tick_ns
         slide = frames[tick].at("red.goal", "joint_positions") if tick else 0.0
-        assert (value.slide, value.tick) == (2.0 * slide, float(tick))
+        assert value == type(value)(2.0 * slide, float(tick), f"red.goal at {tick} \u2713", [tick, -1])
     assert frames[60].at("red.goal", "reach.samples") == 12.0, "100 Hz of 500"
     export_capture(tmp_path / "run.mcap", "packets", tmp_path / "packets.csv")
     sent = open_capture(tmp_path / "run.mcap").packets
@@ -517,16 +469,6 @@ def test_a_command_that_is_not_finite_names_robot_player_file_and_line() -> None
     assert "red.goal/turn takes rate" in reason and f"(own_listener.py:{line})" in reason
 
 
-@pytest.mark.usefixtures("site")
-def test_a_reading_in_words_reaches_a_player() -> None:
-    rehearsed(TELLER, listens({"red.attack": ["words"]}))
-    heard = sys.modules["own_listener"].Listener.heard
-    assert ("red.attack", "words") in heard, "the player heard nothing that it could decode"
-    value = heard["red.attack", "words"][0]
-    assert type(value) is sys.modules["own_tellers"].Told
-    assert (value.text, value.slide, value.ticks) == ("red.attack at 0.000 m \u2713", 0.0, [0, -1])
-
-
 WRONG: Final = (
     ("kind: 'own_gauges:ReachGauge', rate: 100 Hz, scale: 11.0",
      [("11.0", ".scale: more than the most that is valid, 10.0, 11.0")]),
@@ -538,12 +480,6 @@ WRONG: Final = (
       ("3 mm", ".rate: not a rate (a number and one of Hz, kHz, mHz); mm measures a length, '3 mm'")]),
     ("rate: 100 Hz, kind: 'own_gauges:Idle'",
      [("'own", ".kind: not registered as a sensor; own_gauges registers ReachGauge, 'own_gauges:Idle'")]),
-    ("kind: 'own_gone:Idle', rate: 100 Hz",
-     [("'own", ".kind: there is no module own_gone (it is neither beside the deployment nor on PYTHONPATH), "
-       "'own_gone:Idle', nearest is 'own_gauges:Idle'")]),
-    ("kind: own_gauges.ReachGauge, rate: 100 Hz",
-     [("own_gauges", f".kind: unknown sensor (there are: {', '.join(names('sensor'))}, "
-       "or any module:Class), 'own_gauges.ReachGauge'")]),
 )  # fmt: skip
 """Settings, and what is said of them at which word."""
 
@@ -565,12 +501,10 @@ def test_what_is_wrong_with_settings_of_ones_own_has_its_place(settings: str, sa
 
 @pytest.mark.usefixtures("site")
 def test_a_model_that_lacks_what_a_component_needs_is_refused() -> None:
-    with pytest.raises(DeploymentError) as error:
-        apply_sets(TEXT, "t.yaml", ["robots.camera.sensors.own={kind: 'own_tellers:Teller', rate: 100 Hz}"])
-    (problem,) = error.value.problems
-    assert problem.endswith(
+    (problem,) = problems(REACH.replace("red.goal.sensors.reach", "camera.sensors.own"))
+    assert problem == (
         "robots.camera.sensors.own.kind: sensor that a camera cannot carry, for lack of joint_positions "
-        "(valid on: differential_drive with dynamics: rigid, rod), 'own_tellers:Teller'"
+        "(valid on: differential_drive with dynamics: rigid, rod), 'own_gauges:ReachGauge'"
     )
 
 
@@ -593,5 +527,5 @@ def test_a_sensor_may_have_the_name_of_an_actuator_that_its_robot_does_not_have(
     sensor = "robots.red.goal.sensors={position: {kind: ball, rate: 100 Hz}}"
     for actuators in ("{}", f"{{loop: {LOOP}}}"):
         sets = ["players={}", f"robots.red.goal.actuators={actuators}", sensor]
-        robot = load_deployment(apply_sets(TEXT, TABLE.name, sets), TABLE.name).robots["red.goal"]
+        robot = deployed(*sets).robots["red.goal"]
         assert list(robot.sensors) == ["position"] and "position" not in robot.actuators

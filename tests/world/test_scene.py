@@ -1,7 +1,6 @@
 """The table's scene: where things are, how links move, what a body can reach."""
 
 from math import cos, pi, sin, sqrt
-from pathlib import Path
 
 import pytest
 import yaml
@@ -14,12 +13,10 @@ from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.scene import Box, Shape, Vector, inertia_about_axis, multiply, place, rotate, swept_box, turn
+from tests.deployed import DEPLOYMENT, LAYOUT, TEXT, deployed
 from tests.placing import place_ball
 
-TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
-DEPLOYMENT = load_deployment(TEXT, "table.yaml")
 TABLE = table_of(DEPLOYMENT)
-LAYOUT = build_layout(DEPLOYMENT)
 SCENE = build_scene(DEPLOYMENT, LAYOUT)
 
 
@@ -43,7 +40,7 @@ def test_rotations_compose() -> None:
     assert rotate(turn((0.0, 1.0, 0.0), pi / 2), (0.0, 0.0, -1.0)) == pytest.approx((-1.0, 0.0, 0.0))
 
 
-def test_red_stands_at_negative_x_and_blue_is_mirrored() -> None:
+def test_red_is_at_negative_x_and_blue_is_mirrored() -> None:
     for line in ("goal", "defence", "midfield", "attack"):
         red, blue = SCENE.bodies[f"red.{line}"], SCENE.bodies[f"blue.{line}"]
         assert red.position[0] == TABLE.lines[line].x == -blue.position[0]
@@ -137,7 +134,7 @@ def test_inertia_comes_from_the_parts() -> None:
 def test_a_strip_rises_from_the_floor_to_the_side_wall(side: float) -> None:
     """Along the whole wall, in front of the ramps' corners, too."""
     sets = ["table.strips={height: 6 mm, width: 20 mm}", "table.ramps.height=0 mm"]
-    spec = load_deployment(apply_sets(TEXT, "table.yaml", sets), "table.yaml")
+    spec = deployed(*sets)
     strips = [shape for shape in build_scene(spec, build_layout(spec)).scenery if shape.surface == "ramps"]
     wide = TABLE.field.width / 2
     assert len(strips) == 2

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import pytest
 
@@ -11,22 +10,20 @@ from foosim.deployment.loader import load_deployment
 from foosim.world.assembly import sections
 from foosim.world.assembly.sections import findings_of, gravity_of, physics_of
 from foosim.world.fixed_scenery import kits_of
-
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
-DEPLOYMENT: Final = load_deployment(TABLE.read_text(), TABLE.name)
+from tests.deployed import DEPLOYMENT, TABLE
 
 
-def test_the_tables_kit_says_it() -> None:
+def test_the_tables_kit_defines_gravity() -> None:
     assert list(findings_of(DEPLOYMENT)) == [] and physics_of(DEPLOYMENT).gravity == 9.81
 
 
-def test_gravity_is_that_of_the_kit_that_says_it_else_standard_gravity() -> None:
+def test_gravity_is_the_kits_or_standard_gravity() -> None:
     hall = TABLE.with_stem("warehouse")
     assert gravity_of(DEPLOYMENT) == 9.81
     assert gravity_of(load_deployment(hall.read_text(), hall.name)) == 9.80665
 
 
-def test_two_that_say_it_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_definitions_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     ((_, kit),) = kits_of(DEPLOYMENT)
     given: list[tuple[str, Any]] = [("table", kit), ("zoo", kit)]
     monkeypatch.setattr(sections, "kits_of", lambda spec: given)

@@ -9,10 +9,10 @@ from statistics import NormalDist, fmean
 from typing import Final
 
 import numpy as np
+import pytest
 
 from foosim.common.batched.noise import NoiseKey
 from foosim.common.keyed_random import draw_key
-from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.library.table.settings import table_of
 from foosim.node.tick import Stepper
@@ -23,20 +23,17 @@ from foosim.world.components.view import SensingView
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
+from tests.deployed import deployed
+from tests.own_forms import folder_on_path, written
 
-TEXT: Final = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 AT_ONCE: Final = "robots.camera.sensors.ball.modifiers=[{kind: gaussian_noise, std: {x: 1.5 mm, y: 1.5 mm}}]"
 """A camera without its latency: each tick has its picture."""
-DEPLOYMENT: Final = load_deployment(apply_sets(TEXT, "table.yaml", [AT_ONCE]), "table.yaml")
+DEPLOYMENT: Final = deployed(AT_ONCE)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 NUMBERS: Final = initial_numbers(DEPLOYMENT, LAYOUT)
 COUNT: Final = 20_000
 CELLS: Final = 64
 CHI2_63_999: Final = 103.44
-
-
-def deployed(*sets: str) -> Deployment:
-    return load_deployment(apply_sets(TEXT, "table.yaml", [AT_ONCE, *sets]), "table.yaml")
 
 
 def fitted(robot: str, channel: str, deployment: Deployment = DEPLOYMENT) -> BoundSensor:
@@ -92,10 +89,10 @@ def test_noise_is_keyed_by_seed_robot_and_channel() -> None:
     assert struct.unpack("<2d", alone) == (0.0002 * slide, radians(0.5) * spin)
     noise = "modifiers: [{kind: gaussian_noise, std: {slide: 0.2 mm, spin: 0.5 deg}}]"
     both = f"{{kind: encoder, rate: 100 Hz, {noise}}}"
-    second = deployed(f"robots.red.goal.sensors={{encoder: {both}, second: {both}}}")
+    second = deployed(AT_ONCE, f"robots.red.goal.sensors={{encoder: {both}, second: {both}}}")
     start = initial_numbers(second, build_layout(second))
     others = [
-        sampled(fitted("red.goal", "encoder", deployed("seed=2")), NUMBERS, 777),
+        sampled(fitted("red.goal", "encoder", deployed(AT_ONCE, "seed=2")), NUMBERS, 777),
         sampled(fitted("red.attack", "encoder"), NUMBERS, 777),
         sampled(fitted("red.goal", "second", second), start, 777),
     ]
@@ -103,8 +100,34 @@ def test_noise_is_keyed_by_seed_robot_and_channel() -> None:
     assert sampled(fitted("red.goal", "encoder", second), start, 777) == alone, "what else it has is nothing"
 
 
+def test_a_sensor_draws_by_a_key_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two of one type on a robot draw differently, and a change of one changes no draw of the other."""
+    written(
+        folder_on_path(tmp_path, monkeypatch),
+        "from foosim.common.keyed_random import draw_words, unit_interval",
+        "class Dice(Sensor):",
+        "    def __init__(self, settings, at): self.key = at.key",
+        "    def sample(self, view): return Number(unit_interval(draw_words(self.key, view.tick)[0]))",
+        "sensor('dice', Settings, Number)(Dice)",
+    )
+
+    def drawn(robot: str, channel: str, beside: str, *sets: str) -> list[bytes]:
+        dice = "{kind: 'own_form:Dice', rate: 100 Hz}"
+        its = [f"robots.{name}.sensors={{one: {dice}{beside}}}" for name in ("red.goal", "red.attack")]
+        deployment = deployed(AT_ONCE, "players={}", *its, *sets)
+        numbers = initial_numbers(deployment, build_layout(deployment))
+        return [sampled(fitted(robot, channel, deployment), numbers, tick) for tick in range(20)]
+
+    second = ", two: {kind: 'own_form:Dice', rate: 50 Hz}"
+    alone = drawn("red.goal", "one", "")
+    others = drawn("red.goal", "two", second), drawn("red.attack", "one", ""), drawn("red.goal", "one", "", "seed=2")
+    assert len({*alone}.union(*others)) == 80
+    for beside in (second, second.replace("50 Hz", "100 Hz, count: 3"), ", two: {kind: encoder, rate: 100 Hz}"):
+        assert drawn("red.goal", "one", beside) == alone
+
+
 def test_without_noise_a_sample_is_the_frame() -> None:
-    quiet = deployed("robots.camera.sensors.ball.modifiers=[]")
+    quiet = deployed(AT_ONCE, "robots.camera.sensors.ball.modifiers=[]")
     seen = {tuple(sample) for sample in samples("camera", "ball", NUMBERS, quiet)}
     assert seen == {(0.0, 0.0, table_of(DEPLOYMENT).ball.radius)}
 
@@ -124,7 +147,7 @@ def sensed(deployment: Deployment, ticks: int) -> dict[tuple[str, str], list[int
 
 
 def test_each_sensor_sends_at_its_own_rate_from_tick_zero() -> None:
-    mixed = deployed("robots.camera.sensors.ball.rate=50 Hz", "robots.red.goal.sensors.encoder.rate=500 Hz")
+    mixed = deployed(AT_ONCE, "robots.camera.sensors.ball.rate=50 Hz", "robots.red.goal.sensors.encoder.rate=500 Hz")
     sent = sensed(mixed, 60)
     assert sent.pop(("camera", "ball")) == list(range(0, 60, 10))
     assert sent.pop(("red.goal", "encoder")) == list(range(60))
@@ -143,6 +166,7 @@ def test_counters_of_samples_are_the_owners_slots() -> None:
 
 def test_what_a_robot_sends_is_numbered_in_the_order_of_channels() -> None:
     two = deployed(
+        AT_ONCE,
         "robots.red.goal.sensors={zeta: {kind: encoder, rate: 100 Hz}, alpha: {kind: encoder, rate: 100 Hz}}",
         "players={}",
     )

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.table.settings import table_of
 from foosim.node.edited_frame import edit
 from foosim.world.assembly.world import initial_numbers
@@ -18,11 +16,11 @@ from foosim.world.edits import Remove
 from foosim.world.forms.forms import ENTITY, NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout, build_layout
+from tests.deployed import deployed
 from tests.placing import added_ball
 
-TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SETS: Final = ("robots.red.goal.tags=[keeper]", "robots.blue.goal.tags=[keeper]", "table.spare_balls=1")
-DEPLOYMENT: Final = load_deployment(apply_sets(TABLE.read_text(), TABLE.name, SETS), TABLE.name)
+DEPLOYMENT: Final = deployed(*SETS)
 LAYOUT: Final = build_layout(DEPLOYMENT)
 AROUND: Final = Surroundings(DEPLOYMENT, LAYOUT)
 STILL: Final = (0.0, 0.0, 0.0)

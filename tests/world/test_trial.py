@@ -237,6 +237,12 @@ BROKEN: Final = {
         "",
         "inf, 2.0, 0.1 for mover position: numbers of a frame",
     ),
+    "a rule that writes what is not finite": (
+        "abs(view.read(self.velocity)[0])",
+        "float('nan')",
+        "robots.mover.rules",
+        "nan for mover wears.way: numbers of a frame are finite (own_forms.py:",
+    ),
     "a slot that is none": ('at.slot("count")', 'at.slot("cuont")', "robots.mover.sensors:", "cuont"),
     "a reading of another type": (
         "Reading(*view",
