@@ -27,7 +27,7 @@ from foosim.common.errors import Failed
 from foosim.launcher.hosts import Remote
 from foosim.runtime.command import REFUSED
 from foosim.runtime.process import BY_SIGNAL, GRACE_S, ROLE, STACK_SIGNAL, child_environment, script
-from foosim.world.forms.failures import in_library
+from foosim.world.component_types.failures import in_library
 
 _VMSTAT: Final = Path("/proc/vmstat")
 _OWN_GROUP: Final = Path("/proc/self/cgroup")

@@ -20,8 +20,8 @@ from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.scene_json import jobs_of
 from foosim.console.shown.source import Answered, Feed
 from foosim.deployment.schema import Deployment
+from foosim.world.component_types.jobs import JobState
 from foosim.world.components.fitted import BoundActuator, actuators_of
-from foosim.world.forms.jobs import JobState
 from foosim.world.layout import Layout
 
 VERBS: Final = ("send", "cancel")

@@ -13,13 +13,13 @@ from pydantic import Field
 from foosim.common.spec_base import default
 from foosim.library.rigid.joints import JointGroup, JointLoopSettings, Positions, loop_points
 from foosim.library.rigid.spline import fastest, position_at
+from foosim.world.component_types.descriptions import Carrier
+from foosim.world.component_types.jobs import FAILURE, JobState
+from foosim.world.component_types.quantities import JobNumber
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.forms import Carrier
-from foosim.world.forms.jobs import FAILURE, JobState
-from foosim.world.forms.quantities import JobNumber
-from foosim.world.forms.registry import actuator
 from foosim.world.moving.progress import Patience
 
 POINTS_MAX: Final = 256

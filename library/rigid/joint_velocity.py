@@ -5,10 +5,10 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.library.rigid.joints import JointGroup, JointSettings, Velocities, set_points
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.registry import actuator
 
 
 class JointVelocitySettings(JointSettings):

@@ -331,7 +331,7 @@ PARTS: Final = "".join(
 )
 OWN_SPIN: Final = """
 from foosim.library.rigid.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
-from foosim.world.forms.registry import actuator
+from foosim.world.component_types.registry import actuator
 from foosim.library.rigid.joints import set_points
 
 class SpinSettings(JointVelocitySettings): pass

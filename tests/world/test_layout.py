@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from foosim.deployment.schema import Deployment
 from foosim.simulation.simulation import read_for_stepping
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.components.view import Mounting
-from foosim.world.forms.forms import ABSENT
 from foosim.world.layout import NOTHING, Carried, Declared, Layout, build_layout
 from tests.deployed import DEPLOY, DEPLOYMENT, LAYOUT, deployed
 

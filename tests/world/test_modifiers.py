@@ -25,7 +25,7 @@ from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered
 from tests.deployed import deployed
 from tests.kinematic_yard import Yard, yard_text
-from tests.own_forms import folder_on_path, written
+from tests.own_components import folder_on_path, written
 
 ENCODER: Final = "robots.red.goal.sensors.encoder"
 PERIOD: Final = 5

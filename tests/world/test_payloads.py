@@ -26,9 +26,9 @@ from foosim.library.rigid.joint_trajectory import Trajectory
 from foosim.library.table.ball import BallPosition
 from foosim.library.table.encoder import RodPosition
 from foosim.library.table.rod_position import Command
-from foosim.world.forms.payloads import PayloadCodec, field_at
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component, names
+from foosim.world.component_types.payloads import PayloadCodec, field_at
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component, names
 from tests.deployed import DEPLOYMENT, TABLE
 
 ENCODER = CommandEncoder(DEPLOYMENT)

@@ -24,7 +24,7 @@ from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import RobotPacket
 from tests.deployed import deployed
-from tests.own_forms import folder_on_path, written
+from tests.own_components import folder_on_path, written
 
 AT_ONCE: Final = "robots.camera.sensors.ball.modifiers=[{kind: gaussian_noise, std: {x: 1.5 mm, y: 1.5 mm}}]"
 """A camera without its latency: each tick has its picture."""

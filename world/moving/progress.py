@@ -6,8 +6,8 @@ from typing import Annotated, Final
 
 from foosim.common import units
 from foosim.common.units import Quantity
+from foosim.world.component_types.jobs import JobState
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.jobs import JobState
 
 Patience = Annotated[int, Quantity(units.TIME, "0.1 s", "1 h")]
 SLOTS: Final = {"nearest": 1, "waited": 1}

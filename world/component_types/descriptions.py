@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from foosim.common.errors import BadValue, show
 from foosim.common.names import NAME_RULE, is_name
 from foosim.common.units import Quantity
-from foosim.world.forms.failures import failure_of
+from foosim.world.component_types.failures import failure_of
 
 if TYPE_CHECKING:
     from msgspec import Struct
@@ -208,11 +208,11 @@ class Component(ComponentType):
     fields, where these have several each, or a function that returns it.
     `moves`: an actuator commands the motors of its robot. `joints` is the setting that names their joints, in the order
     of the actuator's set-points; without such a setting, or with None, it commands all. No motor is commanded by two
-    actuators. `jobs`: its commands may be jobs (`forms.jobs`).
+    actuators. `jobs`: its commands may be jobs (`component_types.jobs`).
     `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0; or a function that returns it, maybe a slot of an actuator.
-    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
-    `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
+    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `component_types.shown`; empty for none.
+    `per_field` are the settings with a number for each field (`component_types.per_field`), and the least that is valid of each;
     None without a least one.
     """
 

@@ -11,8 +11,8 @@ from foosim.common.errors import BadValue, Refused, show
 from foosim.common.names import NAME_RULE, is_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.forms import forms
-from foosim.world.forms.forms import (
+from foosim.world.component_types import descriptions
+from foosim.world.component_types.descriptions import (
     OF_ROBOTS,
     OF_SOLVED,
     SET_BY_FOOSIM,
@@ -21,10 +21,10 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
-from foosim.world.forms.jobs import JOB
-from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.settings import BASES
-from foosim.world.forms.shown import MESSAGES
+from foosim.world.component_types.jobs import JOB
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.component_types.settings import BASES
+from foosim.world.component_types.shown import MESSAGES
 
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
 """The noun of a component's values."""

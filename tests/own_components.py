@@ -16,8 +16,8 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
-from foosim.world.assembly import used_forms
-from foosim.world.forms import registry
+from foosim.world.assembly import versions
+from foosim.world.component_types import registry
 from tests.deployed import TABLE, TEXT
 
 HEAD: Final = """
@@ -30,10 +30,10 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.forms.forms import ENTITY, ROBOTS
-from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import *
-from foosim.world.forms.settings import *
+from foosim.world.component_types.descriptions import ENTITY, ROBOTS
+from foosim.world.component_types.quantities import Metres
+from foosim.world.component_types.registry import *
+from foosim.world.component_types.settings import *
 from foosim.world.components.base import *
 
 
@@ -90,7 +90,7 @@ def forget_modules() -> None:
     """Modules, and deployments that name theirs, are looked for anew: another one of the same name is elsewhere now."""
     loader._kept.clear()
     for kept in (
-        *(used_forms._spec, used_forms._source, used_forms._imports, used_forms._folder),
+        *(versions._spec, versions._source, versions._imports, versions._folder),
         *(loader._applied, registry._entry_points),
     ):
         kept.cache_clear()
