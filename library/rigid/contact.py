@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from foosim.world.components.base import Sensor
-from foosim.world.components.view import Mounting, SlotReadings, View
+from foosim.world.components.base import Sensor, need
+from foosim.world.components.view import SlotReadings, View
 from foosim.world.forms.quantities import Count, NewtonSeconds
 from foosim.world.forms.registry import sensor
 from foosim.world.forms.settings import SensorSettings
@@ -26,12 +26,11 @@ class Touches(Struct, frozen=True):
     substep: Count
 
 
-@sensor("contact", ContactSettings, Touches, needs=("contacts",), trigger="contacts")
+@sensor("contact", ContactSettings, Touches, trigger="contacts")
 class ContactSensor(Sensor):
     """Touches of a robot in the last tick: how many began, their impulse, the last substep with one."""
 
-    def __init__(self, settings: ContactSettings, at: Mounting) -> None:
-        self.contacts = at.slot("contacts")
+    contacts = need()
 
     def sample(self, view: View) -> Touches:
         return Touches(*view.read(self.contacts))

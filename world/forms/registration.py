@@ -116,8 +116,10 @@ def _values(found: Any) -> Iterator[str]:
 
 
 def _slots(found: Any, key: str, slots: Any) -> Iterator[str]:
-    if callable(slots) and found.type_name in ("model", "sensor", "actuator", "modifier"):
+    if callable(slots) and found.type_name == "model":
         return
+    if key == "slots" and isinstance(found, forms.Component):
+        slots = {name: 1 if callable(size) else size for name, size in slots.items()}
     problem = slots_problem(slots, is_sensor=found.type_name == "sensor")
     if problem:
         yield f"{key}: {problem}"

@@ -117,7 +117,8 @@ def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
 
 def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **about: Any) -> Decorator:
     def register(made: Made) -> Made:
-        found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **about})
+        its = about | _declared(form, made, about)
+        found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **its})
         check_form(found)
         key = form, name
         if found.module != _own_modules().get(name):
@@ -129,6 +130,17 @@ def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **a
         return made
 
     return register
+
+
+def _declared(form: str, made: Any, about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the slots and needs that a class declares by `slot` and `need`, as fields of its description."""
+    declared = getattr(made, "declared", {}).values()
+    if "slots" in about and form != "model":
+        raise Refused(f"the slots of {made.__name__} are declared in its class, as offset = slot(3), not by slots=")
+    slots = {one.name: one.size for one in declared if one.size is not None}
+    needs = (*(one.name for one in declared if one.size is None), *about.get("needs", ()))
+    shared = tuple(one.name for one in declared if one.is_shared)
+    return {key: its for key, its in (("slots", slots), ("needs", needs), ("shared", shared)) if its}
 
 
 def _described(kind: type[Any], about: dict[str, Any]) -> Any:
