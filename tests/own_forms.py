@@ -13,7 +13,6 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
-from foosim.world.assembly import used_forms
 from foosim.world.forms import registry
 
 TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
@@ -86,10 +85,7 @@ def folder_on_path(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def forget_modules() -> None:
     """Modules, and deployments that name theirs, are looked for anew: another one of the same name is elsewhere now."""
     loader._kept.clear()
-    for kept in (
-        *(used_forms._spec, used_forms._source, used_forms._imports, used_forms._folder),
-        *(loader._applied, registry._entry_points),
-    ):
+    for kept in (loader._applied, registry._entry_points):
         kept.cache_clear()
     invalidate_caches()
 

@@ -10,14 +10,13 @@ that one within a function counts.
 
 from __future__ import annotations
 
-import ast
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from hashlib import blake2b
-from importlib.machinery import ModuleSpec
-from importlib.util import find_spec, resolve_name
+from modulefinder import ModuleFinder
+from pathlib import Path
 from typing import Any, Final
 
 from foosim.world.forms import registry
@@ -83,92 +82,38 @@ def _version(made: Callable[..., Any]) -> str:
 
 
 def sources_of(made: Any) -> dict[str, bytes]:
-    """Return the sources of a form, by module: text, or the bytes of a compiled module."""
-    bases = [base.__module__ for base in getattr(made, "__mro__", ())]
-    modules = [module for module in (made.__module__, *bases) if _is_foreign(module)]
+    """Return the files of a component's class and its base classes, and of what they import of their own, by module."""
     found: dict[str, bytes] = {}
-    waiting = list(dict.fromkeys(modules))
-    while waiting:
-        module = waiting.pop()
-        if module in found:
-            continue
-        found[module] = _source(module)
-        waiting += [other for other in _imports(module) if other not in found and _belongs(other, module)]
+    for module in dict.fromkeys(base.__module__ for base in getattr(made, "__mro__", (made,))):
+        if _top(module) not in (OURS, *sys.stdlib_module_names, "__main__") and module not in found:
+            found |= _Imports(module).sources()
     return dict(sorted(found.items()))
-
-
-def _is_foreign(module: str) -> bool:
-    return _top(module) not in (OURS, *sys.stdlib_module_names, "__main__")
 
 
 def _top(module: str) -> str:
     return module.partition(".")[0]
 
 
-@cache
-def _spec(module: str) -> ModuleSpec | None:
-    with suppress(Exception):  # a parent without submodules, a module without a spec
-        return find_spec(module)
-    return None
+class _Imports(ModuleFinder):
+    """The modules that a module may import of its top-level package, and of its folder outside of the libraries."""
 
+    def __init__(self, module: str) -> None:
+        top = sys.modules[_top(module)]
+        self._module = module
+        self._folder = Path([*getattr(top, "__path__", ()), top.__file__ or ""][0]).parent
+        self._is_library = in_library(f"{self._folder}/")
+        super().__init__(path=[str(self._folder)], excludes=[OURS, *sys.stdlib_module_names])
+        with suppress(ImportError):  # of an editable install: it is found in another way than by its folder
+            self.import_hook(module)
 
-@cache
-def _source(module: str) -> bytes:
-    """Return the source of a module, or the bytes of its file without source; nothing of a namespace."""
-    spec = _spec(module)
-    loader: Any = None if spec is None else spec.loader
-    text = None
-    with suppress(Exception):  # a loader may raise anything
-        text = loader.get_source(module)
-    if text is not None:
-        return str(text).encode()
-    with suppress(Exception):
-        return bytes(loader.get_data(spec.origin if spec is not None else ""))
-    return b""
+    def import_module(self, partname: str, fqname: str, parent: Any) -> Any:
+        """Find a module of its own; None for any other."""
+        if self._is_library and _top(fqname) != _top(self._module):
+            return None
+        return super().import_module(partname, fqname, parent)
 
-
-@cache
-def _imports(module: str) -> tuple[str, ...]:
-    """Return the modules that one may import, and the packages that it is in."""
-    spec = _spec(module)
-    found = dict.fromkeys(_parents(module))
-    with suppress(SyntaxError, ValueError):  # of a compiled module
-        for node in ast.walk(ast.parse(_source(module))):
-            for name in _names(node, "" if spec is None else spec.parent or ""):
-                found |= dict.fromkeys([*_parents(name), name])
-    return tuple(name for name in found if _is_foreign(name) and _spec(name) is not None)
-
-
-def _parents(module: str) -> list[str]:
-    parts = module.split(".")
-    return [".".join(parts[:count]) for count in range(1, len(parts))]
-
-
-def _names(node: ast.AST, package: str) -> Iterator[str]:
-    """Yield the modules that a statement may import: a name that is imported from a package may be one."""
-    if isinstance(node, ast.Import):
-        yield from (alias.name for alias in node.names)
-    elif isinstance(node, ast.ImportFrom):
-        base = "." * node.level + (node.module or "")
-        with suppress(ImportError):  # above its top
-            base = resolve_name(base, package or None)
-        if base and not base.startswith("."):
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names if alias.name != "*")
-
-
-def _belongs(other: str, module: str) -> bool:
-    """Whether a module is of the same package as another, or lies in the same folder outside of the libraries."""
-    here, there = _folder(_top(module)), _folder(_top(other))
-    return _top(other) == _top(module) or (bool(here) and here == there and not in_library(f"{here}/"))
-
-
-@cache
-def _folder(top: str) -> str:
-    """Return the folder of a module or package; empty where it is unknown."""
-    spec = _spec(top)
-    if spec is None:
-        return ""
-    places = [*(spec.submodule_search_locations or ())]
-    place = places[0] if places else (spec.origin or "") if spec.has_location else ""
-    return place.rpartition("/")[0]
+    def sources(self) -> dict[str, bytes]:
+        """Return the files of these modules."""
+        files = {name: getattr(module, "__file__", None) for name, module in self.modules.items()}
+        files.setdefault(self._module, sys.modules[self._module].__file__)
+        return {name: Path(file).read_bytes() for name, file in files.items() if file}

@@ -62,7 +62,7 @@ class Component:
         of_classes = [one for kind in reversed(cls.__mro__) for one in vars(kind).items()]
         cls.declared = {attribute: one for attribute, one in of_classes if isinstance(one, Declared)}
 
-    def __new__(cls, settings: Any, at: Any) -> Self:
+    def __new__(cls, settings: Any, at: Any, *more: Any) -> Self:
         made = super().__new__(cls)
         for attribute, one in cls.declared.items():
             setattr(made, attribute, at.slot(one.name))
