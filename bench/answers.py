@@ -22,7 +22,7 @@ import numpy as np
 from bench.runs import watch
 from foosim.client.client import connect
 from foosim.client.errors import RunEnded
-from foosim.world.forms.jobs import JobState
+from foosim.world.component_types.jobs import JobState
 
 NAME, ROBOT, ACTUATOR, CHANNELS = "hand", "scout", "drive", ("jobs", "pose")
 TEXT: Final = f"""

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import FrameRow, PacketRow
 from foosim.common.names import nearest_name
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.components.mounted import free_poses
-from foosim.world.forms.forms import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.kinematics import CENTRE_OF_SLOT, forward_kinematics
 from foosim.world.layout import Layout

@@ -1,4 +1,4 @@
-"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`forms.shown`), of any other
+"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`shown`), of any other
 sensor from a plug-in as JSON.
 
 Each of them has a topic, `/readings/ROBOT/CHANNEL`. A message is the reading as the robot sent it: after modifiers,
@@ -19,11 +19,11 @@ from foosim.common.errors import Malformed
 from foosim.common.json_text import encode_json
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import build_scene
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.settings import SensorSettings
+from foosim.world.component_types.shown import LASER_SCAN, LOCATION_FIX, MESSAGES, POSE, POSE_IN_FRAME
 from foosim.world.components.mounted import link_index
-from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.settings import SensorSettings
-from foosim.world.forms.shown import LASER_SCAN, LOCATION_FIX, MESSAGES, POSE, POSE_IN_FRAME
 from foosim.world.layout import build_layout
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.robot_packets import RobotPacket

@@ -23,8 +23,8 @@ from foosim.common.errors import Malformed, UnknownName, no_such
 from foosim.common.json_text import encode_json
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
-from foosim.world.forms.payloads import PayloadCodec, as_mapping, plain_type
-from foosim.world.forms.per_field import codec_of
+from foosim.world.component_types.payloads import PayloadCodec, as_mapping, plain_type
+from foosim.world.component_types.per_field import codec_of
 
 Kind = Literal["integer", "number", "text", "bytes", "boolean", "json"]
 POSES_TABLE: Final = "poses"

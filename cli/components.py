@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from foosim.common.errors import UnknownName
-from foosim.world.forms import registry
-from foosim.world.forms.forms import ROBOTS, Component, ComponentType, Model, References
-from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.registration import VALUES
-from foosim.world.forms.registry import FORMS
-from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ROBOTS, Component, ComponentType, Model, References
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.component_types.registration import VALUES
+from foosim.world.component_types.registry import FORMS
+from foosim.world.component_types.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
 from foosim.world.placing import is_placed
 from foosim.world.setting.settable import valid
 

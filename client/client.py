@@ -50,8 +50,8 @@ from foosim.protocol.channels import VHUB, Plane
 from foosim.protocol.messages import Received
 from foosim.runtime.process import new_boot
 from foosim.runtime.transport.inbox import Inbox
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.payloads import Field, Value
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.payloads import Field, Value
 
 if TYPE_CHECKING:
     from foosim.runtime.transport.session import Session

@@ -14,8 +14,8 @@ from foosim.client.player import Command
 from foosim.common.errors import ABSENT, BadValue, UnknownName
 from foosim.common.names import nearest_name
 from foosim.deployment.schema import Deployment
-from foosim.world.forms.payloads import Field, PayloadCodec
-from foosim.world.forms.per_field import codec_of
+from foosim.world.component_types.payloads import Field, PayloadCodec
+from foosim.world.component_types.per_field import codec_of
 
 
 class Taker(NamedTuple):

@@ -22,9 +22,9 @@ from foosim.client.errors import JobCancelled, JobError, JobFailed, JobPreempted
 from foosim.client.player import Commands, Samples
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
+from foosim.world.component_types.jobs import JOB, JobState
 from foosim.world.components.job_reading import Jobs as Reading
 from foosim.world.components.job_reading import JobSettings
-from foosim.world.forms.jobs import JOB, JobState
 
 REPEAT_NS: Final = 100_000_000
 """Simulated time after which a command without a known effect is sent again."""

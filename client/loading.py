@@ -18,8 +18,8 @@ from foosim.client.errors import PlayerError
 from foosim.client.player import Player
 from foosim.common.errors import BadValue
 from foosim.common.finding import Finding
-from foosim.world.forms.failures import place_of_code
-from foosim.world.forms.registry import class_at
+from foosim.world.component_types.failures import place_of_code
+from foosim.world.component_types.registry import class_at
 
 if TYPE_CHECKING:
     from foosim.deployment.schema import Deployment

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 from msgspec import Struct
 from mypy_extensions import mypyc_attr
 
-from foosim.world.forms.payloads import Value
+from foosim.world.component_types.payloads import Value
 
 if TYPE_CHECKING:
     from foosim.deployment.schema import Deployment

@@ -20,8 +20,8 @@ from foosim.deployment.channel_kinds import channel_codec
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema import Player as Declaration
 from foosim.protocol.messages import Received
-from foosim.world.forms.failures import failure_of, place_of_code
-from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.component_types.failures import failure_of, place_of_code
+from foosim.world.component_types.payloads import PayloadCodec
 
 NS_PER_S: Final = 1_000_000_000
 

@@ -34,7 +34,7 @@ from foosim.protocol.messages import Answer, Request
 from foosim.protocol.replay_messages import CLOCK, STREAMS, Played, PlayedPacket, ReplayClock
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.runtime.transport.inbox import Inbox
-from foosim.world.forms.payloads import Value
+from foosim.world.component_types.payloads import Value
 
 if TYPE_CHECKING:
     from foosim.runtime.transport.session import Session

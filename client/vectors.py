@@ -19,9 +19,9 @@ from foosim.client.player import Packet
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received
+from foosim.world.component_types.payloads import field_at
 from foosim.world.components.bounds import bounds_of
 from foosim.world.components.fitted import BoundActuator, BoundSensor, actuators_of, sensors_of
-from foosim.world.forms.payloads import field_at
 from foosim.world.layout import build_layout
 
 Vector: TypeAlias = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from foosim.common.errors import UnknownName
 from foosim.common.names import CHANNEL_ECHO
 from foosim.deployment.schema import Deployment
-from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.per_field import codec_of
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.component_types.per_field import codec_of
 
 
 def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> PayloadCodec | None:

@@ -14,8 +14,8 @@ from foosim.common.errors import BadValue
 from foosim.common.finding import Finding, Location
 from foosim.common.spec_base import SpecBase
 from foosim.deployment.schema_errors import settings_findings
-from foosim.world.forms import registry
-from foosim.world.forms.settings import BASES, RobotSettings
+from foosim.world.component_types import registry
+from foosim.world.component_types.settings import BASES, RobotSettings
 from foosim.world.spec import KITS
 
 ROBOTS: Final = "robots"

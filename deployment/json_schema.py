@@ -6,9 +6,9 @@ from typing import Any, Final
 from foosim.common.names import CLASS_PATTERN
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.file_schema import file_schema
-from foosim.world.forms import registry
-from foosim.world.forms.forms import ENGINES, ComponentType, Kit, Model, with_article, word_of
-from foosim.world.forms.settings import BASES, EntitySettings, RobotSettings
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ENGINES, ComponentType, Kit, Model, with_article, word_of
+from foosim.world.component_types.settings import BASES, EntitySettings, RobotSettings
 from foosim.world.spec import KITS
 
 OPEN: Final = {base.__name__: form for form, base in BASES.items()}

@@ -18,7 +18,7 @@ from foosim.common.errors import ABSENT
 from foosim.common.finding import Finding, Location
 from foosim.common.names import nearest_quoted, quoted
 from foosim.deployment import hosts
-from foosim.world.forms import registry
+from foosim.world.component_types import registry
 
 _NAME = "lower case letters, digits, - and _, a letter first"
 _PATTERNS: Final = {

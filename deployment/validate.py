@@ -28,12 +28,9 @@ from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.validate_network import Names, check_network, place_findings, rule_findings
 from foosim.world.air import WindSettings
 from foosim.world.assembly.sections import findings_of
-from foosim.world.assembly.used_forms import foreign_versions
-from foosim.world.components.reach import REACHED
-from foosim.world.components.view import IncompatibleComponent, Mounting
-from foosim.world.forms import registry
-from foosim.world.forms.failures import failure_of
-from foosim.world.forms.forms import (
+from foosim.world.assembly.versions import foreign_versions
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import (
     JOINTS,
     JOINTS_MAX,
     ROBOTS,
@@ -48,8 +45,9 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
-from foosim.world.forms.per_field import Numbers, numbers_of, read_per_field
-from foosim.world.forms.settings import (
+from foosim.world.component_types.failures import failure_of
+from foosim.world.component_types.per_field import Numbers, numbers_of, read_per_field
+from foosim.world.component_types.settings import (
     ActuatorSettings,
     ComponentSettings,
     EntitySettings,
@@ -57,6 +55,8 @@ from foosim.world.forms.settings import (
     RobotSettings,
     SensorSettings,
 )
+from foosim.world.components.reach import REACHED
+from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.layout import (
     WORLD,
     Declaring,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from foosim.deployment.schema import Deployment
     from foosim.protocol.replay_messages import PlayedPacket, PlayedPoses
     from foosim.simulation.simulation import Simulation
-    from foosim.world.forms.jobs import JobState
+    from foosim.world.component_types.jobs import JobState
 
 __all__ = [
     "Capture",
@@ -56,7 +56,7 @@ _MODULES = {
     "foosim.deployment.schema": ("Deployment",),
     "foosim.protocol.replay_messages": ("PlayedPacket", "PlayedPoses"),
     "foosim.simulation.simulation": ("Simulation",),
-    "foosim.world.forms.jobs": ("JobState",),
+    "foosim.world.component_types.jobs": ("JobState",),
 }
 
 

@@ -11,30 +11,25 @@ from foosim.common.finding import Finding
 from foosim.common.keyed_random import chance_threshold
 from foosim.common.spec_base import Force, Length, Mass, Rate, SpecBase, Speed, Spin, Torque, default
 from foosim.common.units import Quantity
-from foosim.world.components.base import Actuator, EntityRule, Kit, Model, Modifier, Motion, Rule, Sensor, need, slot
-from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
-from foosim.world.components.mounted import Mounted
-from foosim.world.components.surroundings import Surroundings
-from foosim.world.components.view import IncompatibleComponent, ModifierMounting, Mounting, View, WritableView
-from foosim.world.forms.forms import ROBOTS, Carrier
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.per_field import PerField
-from foosim.world.forms.quantities import Amperes as A
-from foosim.world.forms.quantities import Degrees as deg
-from foosim.world.forms.quantities import JobNumber
-from foosim.world.forms.quantities import Metres as m
-from foosim.world.forms.quantities import MetresPerSecond as m_s
-from foosim.world.forms.quantities import MetresPerSecondSquared as m_s2
-from foosim.world.forms.quantities import NewtonMetres as Nm
-from foosim.world.forms.quantities import Newtons as N
-from foosim.world.forms.quantities import NewtonSeconds as Ns
-from foosim.world.forms.quantities import Radians as rad
-from foosim.world.forms.quantities import RadiansPerSecond as rad_s
-from foosim.world.forms.quantities import Share as share
-from foosim.world.forms.quantities import Volts as V
-from foosim.world.forms.quantities import Watts as W
-from foosim.world.forms.registry import actuator, kit, model, modifier, rule, scene, sensor
-from foosim.world.forms.settings import (
+from foosim.world.component_types.descriptions import ROBOTS, Carrier
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.per_field import PerField
+from foosim.world.component_types.quantities import Amperes as A
+from foosim.world.component_types.quantities import Degrees as deg
+from foosim.world.component_types.quantities import JobNumber
+from foosim.world.component_types.quantities import Metres as m
+from foosim.world.component_types.quantities import MetresPerSecond as m_s
+from foosim.world.component_types.quantities import MetresPerSecondSquared as m_s2
+from foosim.world.component_types.quantities import NewtonMetres as Nm
+from foosim.world.component_types.quantities import Newtons as N
+from foosim.world.component_types.quantities import NewtonSeconds as Ns
+from foosim.world.component_types.quantities import Radians as rad
+from foosim.world.component_types.quantities import RadiansPerSecond as rad_s
+from foosim.world.component_types.quantities import Share as share
+from foosim.world.component_types.quantities import Volts as V
+from foosim.world.component_types.quantities import Watts as W
+from foosim.world.component_types.registry import actuator, kit, model, modifier, rule, scene, sensor
+from foosim.world.component_types.settings import (
     ActuatorSettings,
     EntityRuleSettings,
     ModifierSettings,
@@ -43,6 +38,11 @@ from foosim.world.forms.settings import (
     SceneSettings,
     SensorSettings,
 )
+from foosim.world.components.base import Actuator, EntityRule, Kit, Model, Modifier, Motion, Rule, Sensor, need, slot
+from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
+from foosim.world.components.mounted import Mounted
+from foosim.world.components.surroundings import Surroundings
+from foosim.world.components.view import IncompatibleComponent, ModifierMounting, Mounting, View, WritableView
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
 from foosim.world.matter.materials import CONCRETE, METAL, PLASTIC, WOOD

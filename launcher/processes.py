@@ -28,7 +28,7 @@ from foosim.launcher.hosts import Remote
 from foosim.runtime.children import BY_SIGNAL, GRACE_S, ROLE, child_environment, script
 from foosim.runtime.command import REFUSED
 from foosim.runtime.process import STACK_SIGNAL
-from foosim.world.forms.failures import in_library
+from foosim.world.component_types.failures import in_library
 
 _VMSTAT: Final = Path("/proc/vmstat")
 _OWN_GROUP: Final = Path("/proc/self/cgroup")

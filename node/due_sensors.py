@@ -9,8 +9,8 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.world.component_types.descriptions import DOWN, INACTIVE
 from foosim.world.components.fitted import BoundSensor
-from foosim.world.forms.forms import DOWN, INACTIVE
 from foosim.world.layout import Entity
 
 TURNS_MAX: Final = 64

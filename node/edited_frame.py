@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from foosim.world.assembly.grippers import grippers_of, release
 from foosim.world.assembly.world import body_of
+from foosim.world.component_types.descriptions import DOWN, INACTIVE, NO_ENTITY
 from foosim.world.components.fitted import actuators_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Edit, Push, Remove, Set, counters, fitting_edits, write
-from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, switches_of
 from foosim.world.spec import WorldSpec

@@ -28,12 +28,12 @@ from foosim.world.assembly.islands import Assignment, Share, reach_of
 from foosim.world.assembly.rest import Rest, stop, wake_edited
 from foosim.world.assembly.standing import UnmovedBodies
 from foosim.world.assembly.world import World
+from foosim.world.component_types.descriptions import INACTIVE
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView, View, WritableView
 from foosim.world.components.watching import ReadOnly
 from foosim.world.edits import Edit
-from foosim.world.forms.forms import INACTIVE
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, switches_of
 from foosim.world.robot_packets import Delivered, OutboxPacket, RobotPacket

@@ -32,7 +32,7 @@ from foosim.protocol.messages import (
     Recall,
     Refusal,
 )
-from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.assembly.versions import foreign_versions
 from foosim.world.components.view import ComponentError
 from foosim.world.layout import Layout, build_layout
 from foosim.world.matter.mesh import AssetError

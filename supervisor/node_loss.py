@@ -11,8 +11,8 @@ from typing import Final
 
 from foosim.supervisor.roster import IN_FLIGHT_NS, Process, refuse
 from foosim.supervisor.state import RunState
+from foosim.world.component_types.descriptions import DOWN
 from foosim.world.edits import Edit, Set
-from foosim.world.forms.forms import DOWN
 
 FROZEN: Final = 2.0
 """What `down` holds of a robot that the loss of its node took out of service; 1 where an operator or an event did."""

@@ -19,7 +19,7 @@ from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.channels import VHUB
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Heartbeat, Hello, Ready, Refusal
-from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.assembly.versions import foreign_versions
 
 SILENT_NS: Final = 3 * limits.HEARTBEAT_NS
 """A process that lives is not silent for so long, unless its machine or its loop is suspended."""

@@ -27,7 +27,7 @@ from foosim.common.struct_types import Message
 from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime import GC_THRESHOLDS
-from foosim.world.forms import registry
+from foosim.world.component_types import registry
 from tests.meter import Burden, Meter, measured_seconds, scope_of
 
 settings.register_profile(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from foosim.world.component_types.descriptions import NO_ENTITY, References
 from foosim.world.edits import Add
-from foosim.world.forms.forms import NO_ENTITY, References
 from foosim.world.layout import Entity, Layout
 
 

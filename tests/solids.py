@@ -8,9 +8,9 @@ from typing import Final
 from foosim.node.physics.floors import as_plane
 from foosim.node.physics.interface import Island
 from foosim.node.physics.mujoco_islands import CompositionEngine
+from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS, NO_ENTITY, PARTNERS, PARTNERS_MAX, Model
+from foosim.world.component_types.settings import EntitySettings
 from foosim.world.components.drives import NO_DRIVES, Drives
-from foosim.world.forms.forms import BODY, CONTACTS, JOINTS, NO_ENTITY, PARTNERS, PARTNERS_MAX, Model
-from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity
 from foosim.world.matter.physics import Contact, Physics, Side
 from foosim.world.scene import ORIGIN, UPRIGHT, Body, Box, Geometry, Link, Quaternion, Shape, Sphere, Vector

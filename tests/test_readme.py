@@ -29,8 +29,8 @@ from foosim.launcher.run_options import RunOptions
 from foosim.library.table.rod_position import Command
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import System
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
 
 ROOT: Final = Path(__file__).parents[1]
 FRONT: Final = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]

@@ -7,7 +7,7 @@ from typing import Annotated, Final, NamedTuple
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
-from foosim.world.forms.settings import RuleSettings
+from foosim.world.component_types.settings import RuleSettings
 from foosim.world.layout import WORLD, Layout
 from foosim.world.spec import WorldSpec
 

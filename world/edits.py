@@ -12,8 +12,8 @@ from msgspec import Meta
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.struct_types import Message, Name, Vector
-from foosim.world.forms.forms import ABSENT, DOWN, NO_ENTITY, SAMPLES, SLOTS_MAX
-from foosim.world.forms.jobs import NUMBERS, STATES, JobState
+from foosim.world.component_types.descriptions import ABSENT, DOWN, NO_ENTITY, SAMPLES, SLOTS_MAX
+from foosim.world.component_types.jobs import NUMBERS, STATES, JobState
 from foosim.world.layout import Entity, Layout
 
 FIELD_MAX: Final = 3 * limits.NAME_LENGTH_MAX

@@ -16,8 +16,8 @@ from typing import Any, Final
 
 from foosim.common.errors import BadValue, Malformed
 from foosim.common.finding import Location
-from foosim.world.forms import registry
-from foosim.world.forms.forms import (
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import (
     ABSENT,
     INACTIVE,
     LINEAR_VELOCITY,
@@ -32,9 +32,9 @@ from foosim.world.forms.forms import (
     Model,
     References,
 )
-from foosim.world.forms.jobs import job_slots
-from foosim.world.forms.per_field import Numbers, numbers_of
-from foosim.world.forms.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
+from foosim.world.component_types.jobs import job_slots
+from foosim.world.component_types.per_field import Numbers, numbers_of
+from foosim.world.component_types.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
 from foosim.world.spec import WorldSpec
 
 WORLD: Final = "world"

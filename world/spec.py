@@ -11,11 +11,11 @@ from pydantic import Field, PrivateAttr, SerializeAsAny
 from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import Engine, Kit, Model
+from foosim.world.component_types.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
 from foosim.world.earth import EarthOrigin
 from foosim.world.events import EVENTS_MAX, WorldEvent
-from foosim.world.forms import registry
-from foosim.world.forms.forms import Engine, Kit, Model
-from foosim.world.forms.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
 from foosim.world.matter.mesh import AssetError, Mesh, check_digest
 from foosim.world.matter.physics import PhysicsSettings, SurfaceSettings
 from foosim.world.scene import Shape

@@ -13,8 +13,8 @@ from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, UnknownName
 from foosim.console.shown.scene_json import jobs_of
 from foosim.deployment.schema import Deployment
+from foosim.world.component_types.jobs import JobState
 from foosim.world.components.fitted import BoundActuator, actuators_of
-from foosim.world.forms.jobs import JobState
 from foosim.world.layout import Layout
 
 WORDS: Final[Mapping[JobState, str]] = {

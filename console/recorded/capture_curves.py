@@ -17,7 +17,7 @@ from foosim.console.shown.curves import link_figure, value_at
 from foosim.console.shown.source import Curve
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.world.assembly.world import world_status, world_texts
-from foosim.world.forms.payloads import PayloadCodec
+from foosim.world.component_types.payloads import PayloadCodec
 
 
 def status_at(recording: Recording, account: Mapping[str, Any], tick: int, look: Look | None) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from foosim.console.shown.source import Moment
 from foosim.console.shown.tracks import Pose
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import build_scene
-from foosim.world.forms.forms import ABSENT
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout, build_layout

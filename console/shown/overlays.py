@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from foosim.deployment.schema import Deployment
+from foosim.world.component_types.descriptions import overrides
+from foosim.world.component_types.failures import ContractError
 from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.view import ComponentError, called
-from foosim.world.forms.failures import ContractError
-from foosim.world.forms.forms import overrides
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 

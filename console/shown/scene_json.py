@@ -11,9 +11,9 @@ import numpy as np
 from foosim.client.commands import CommandEncoder
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import mark_kinds
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.component_types.per_field import codec_of
 from foosim.world.components.job_reading import JobSettings
-from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.per_field import codec_of
 from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh

@@ -20,7 +20,7 @@ from foosim.deployment.network.rules import event_of
 from foosim.deployment.network.settings_text import event_words
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import WorldMarks
-from foosim.world.forms.forms import DOWN
+from foosim.world.component_types.descriptions import DOWN
 from foosim.world.frame import Frame
 from foosim.world.setting.settable import WITH_A_PLACE
 

@@ -22,7 +22,7 @@ from foosim.common.errors import BadValue, Refused
 from foosim.common.finding import Location
 from foosim.deployment.text.report import Report
 from foosim.deployment.text.yaml import Fields, Items, Leaf, Place, Scalar, Tree, plain
-from foosim.world.forms import registry
+from foosim.world.component_types import registry
 
 COUNT: Final = "count"
 SPARE: Final = "spare"

@@ -18,8 +18,8 @@ from foosim.common.finding import Location
 from foosim.common.names import NAME_RULE, is_name, nearest_quoted
 from foosim.deployment.text.report import Report
 from foosim.deployment.text.yaml import Fields, Items, Leaf, Place, Tree, plain
-from foosim.world.forms import registry
-from foosim.world.forms.forms import Kit
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import Kit
 
 TEMPLATES: Final = "templates"
 LIKE: Final = "like"

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from math import sqrt
 
+from foosim.world.component_types.per_field import PerField
+from foosim.world.component_types.registry import modifier
+from foosim.world.component_types.settings import ModifierSettings
 from foosim.world.components.base import Modifier, slot
 from foosim.world.components.view import ModifierMounting, WritableView
-from foosim.world.forms.per_field import PerField
-from foosim.world.forms.registry import modifier
-from foosim.world.forms.settings import ModifierSettings
 
 STEP, START = 0, 1
 """Slots of the draws."""

@@ -10,7 +10,7 @@ from foosim.common import units
 from foosim.common.spec_base import Name, SpecBase
 from foosim.common.units import Quantity
 from foosim.library.generic.empty import EmptySettings, floor
-from foosim.world.forms.registry import scene
+from foosim.world.component_types.registry import scene
 from foosim.world.matter.materials import UNKNOWN, Radio
 from foosim.world.placing import ORIGIN_OF_WORLD, At
 from foosim.world.scene import Box, Shape, rotate

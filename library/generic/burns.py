@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.component_types.descriptions import DOWN
+from foosim.world.component_types.registry import rule
+from foosim.world.component_types.settings import EntityRuleSettings
 from foosim.world.components.base import EntityRule, need, slot
 from foosim.world.components.entities import Marked, MarkKind
 from foosim.world.components.fires import Fires
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.forms import DOWN
-from foosim.world.forms.registry import rule
-from foosim.world.forms.settings import EntityRuleSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 
 if TYPE_CHECKING:

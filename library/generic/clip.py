@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import inf
 
 from foosim.common.errors import BadValue
+from foosim.world.component_types.per_field import Numbers, PerField, read_per_field
+from foosim.world.component_types.registry import modifier
+from foosim.world.component_types.settings import ModifierSettings
 from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
-from foosim.world.forms.per_field import Numbers, PerField, read_per_field
-from foosim.world.forms.registry import modifier
-from foosim.world.forms.settings import ModifierSettings
 
 
 class ClipSettings(ModifierSettings):

@@ -10,11 +10,11 @@ from pydantic import Field
 from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.units import Quantity
+from foosim.world.component_types.descriptions import Carrier
+from foosim.world.component_types.registry import modifier
+from foosim.world.component_types.settings import ModifierSettings
 from foosim.world.components.base import Modifier, slot
 from foosim.world.components.view import ModifierMounting, WritableView
-from foosim.world.forms.forms import Carrier
-from foosim.world.forms.registry import modifier
-from foosim.world.forms.settings import ModifierSettings
 
 Delay = Annotated[int, Quantity(units.TIME, "0 s", "10 s")]
 NUMBERS_MAX = 4096

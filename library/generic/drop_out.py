@@ -6,10 +6,10 @@ from typing import Annotated
 
 from foosim.common import units
 from foosim.common.units import Quantity
+from foosim.world.component_types.registry import modifier
+from foosim.world.component_types.settings import ModifierSettings
 from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
-from foosim.world.forms.registry import modifier
-from foosim.world.forms.settings import ModifierSettings
 
 Probability = Annotated[float, Quantity(units.PROBABILITY, "0 %", "100 %")]
 

@@ -7,8 +7,8 @@ from typing import Annotated, Final
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
-from foosim.world.forms.registry import scene
-from foosim.world.forms.settings import SceneSettings
+from foosim.world.component_types.registry import scene
+from foosim.world.component_types.settings import SceneSettings
 from foosim.world.matter.materials import CONCRETE
 from foosim.world.scene import Box, Colour, Shape
 

@@ -15,12 +15,12 @@ from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
 from foosim.library.mobile.vehicles import UprightAt
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import EntitySettings
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.fires import FIRE
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity
 from foosim.world.matter.materials import OPEN
 from foosim.world.matter.mesh import Mesh

@@ -13,11 +13,11 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.component_types.per_field import Numbers
+from foosim.world.component_types.registry import modifier
+from foosim.world.component_types.settings import ModifierSettings
 from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
-from foosim.world.forms.per_field import Numbers
-from foosim.world.forms.registry import modifier
-from foosim.world.forms.settings import ModifierSettings
 
 Length = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
 Angle = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from foosim.world.component_types.per_field import PerField
+from foosim.world.component_types.registry import modifier
+from foosim.world.component_types.settings import ModifierSettings
 from foosim.world.components.base import Modifier
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import ModifierMounting, View
-from foosim.world.forms.per_field import PerField
-from foosim.world.forms.registry import modifier
-from foosim.world.forms.settings import ModifierSettings
 
 if TYPE_CHECKING:
     import numpy as np

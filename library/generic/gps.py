@@ -7,13 +7,13 @@ from typing import ClassVar, Final
 
 from msgspec import Struct
 
+from foosim.world.component_types.quantities import Degrees, Metres
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.earth import Geodesy
-from foosim.world.forms.quantities import Degrees, Metres
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 
 DEGREES: Final = 180.0 / pi

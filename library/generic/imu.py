@@ -15,12 +15,12 @@ from typing import ClassVar
 from msgspec import Struct
 
 from foosim.world.assembly.sections import gravity_of
+from foosim.world.component_types.quantities import MetresPerSecondSquared, RadiansPerSecond
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor, slot
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.quantities import MetresPerSecondSquared, RadiansPerSecond
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.scene import rotate
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from foosim.common.names import nearest_quoted
+from foosim.world.component_types.jobs import CHANGED, FAILURE, NUMBERS, RUNNING, STATES
+from foosim.world.component_types.registry import sensor
 from foosim.world.components.base import Sensor
 from foosim.world.components.job_reading import Jobs, JobSettings
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
-from foosim.world.forms.jobs import CHANGED, FAILURE, NUMBERS, RUNNING, STATES
-from foosim.world.forms.registry import sensor
 
 
 @sensor("job", JobSettings, Jobs, trigger=lambda settings: f"{settings.actuator}.{CHANGED}")

@@ -14,13 +14,13 @@ from foosim.common import units
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.component_types.quantities import Metres
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.beams import Beams, BeamsTogether
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
 from foosim.world.scene import Vector

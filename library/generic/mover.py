@@ -17,12 +17,12 @@ from foosim.common.units import Quantity, custom_error
 from foosim.library.generic.path import Path, Point, path_at_speed, path_of
 from foosim.library.mobile.arcs import Floats, shorter, upright_turn
 from foosim.library.mobile.vehicles import HULL, Height, Radius, Speed, is_in_reach
+from foosim.world.component_types.descriptions import BODY
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.forms import BODY
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.layout import Entity
 from foosim.world.matter.materials import UNKNOWN, Radio
 from foosim.world.moving.columns import EntityColumns

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from foosim.world.component_types.quantities import Metres, Radians
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor, need
 from foosim.world.components.view import SlotReadings, View
-from foosim.world.forms.quantities import Metres, Radians
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 
 
 class PoseSettings(SensorSettings):

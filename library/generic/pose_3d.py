@@ -6,12 +6,12 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from foosim.world.component_types.quantities import Metres, QuaternionPart
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import Metres, QuaternionPart
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 
 

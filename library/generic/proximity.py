@@ -17,13 +17,13 @@ from pydantic import Field
 from foosim.common import units
 from foosim.common.exact_math import cos, sin
 from foosim.common.units import Quantity
+from foosim.world.component_types.quantities import Metres
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.beams import Beams, BeamsTogether, body_of, hull_middle, mounted_at, way_out
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 from foosim.world.rays.boxes import Floats
 
 Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "100 m")]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import floor
 
+from foosim.world.component_types.per_field import PerField
+from foosim.world.component_types.registry import modifier
+from foosim.world.component_types.settings import ModifierSettings
 from foosim.world.components.base import Modifier
 from foosim.world.components.view import ModifierMounting, View
-from foosim.world.forms.per_field import PerField
-from foosim.world.forms.registry import modifier
-from foosim.world.forms.settings import ModifierSettings
 
 
 class QuantiseSettings(ModifierSettings):

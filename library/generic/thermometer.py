@@ -15,13 +15,13 @@ from msgspec import Struct
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.component_types.quantities import DegreesCelsius
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.fires import Fires
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import DegreesCelsius
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 
 Ambient = Annotated[float, Quantity(units.TEMPERATURE, "-100 degC", "100 degC")]

@@ -6,12 +6,12 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, Struct
 
+from foosim.world.component_types.quantities import MetresPerSecond
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import MetresPerSecond
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.scene import rotate
 

@@ -10,10 +10,10 @@ shelters another one. The speed of the air is in the frame, so it can be set dur
 from __future__ import annotations
 
 from foosim.world.air import AIR_SPEED, AXES, WindSettings
+from foosim.world.component_types.registry import rule
 from foosim.world.components.base import Rule, slot
 from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import WritableView
-from foosim.world.forms.registry import rule
 
 
 @rule("wind", WindSettings, settable=dict.fromkeys(AXES, AIR_SPEED))

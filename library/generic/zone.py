@@ -12,12 +12,12 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.units import Quantity, custom_error
 from foosim.library.mobile.vehicles import UprightAt
+from foosim.world.component_types.registry import rule
+from foosim.world.component_types.settings import RuleSettings, Tag
 from foosim.world.components.base import Rule, slot
 from foosim.world.components.entities import Marked, MarkKind, RuleMounting
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import View, WritableView
-from foosim.world.forms.registry import rule
-from foosim.world.forms.settings import RuleSettings, Tag
 from foosim.world.placing import ORIGIN_OF_WORLD
 
 if TYPE_CHECKING:

@@ -24,13 +24,13 @@ from foosim.common.units import Quantity, custom_error
 from foosim.library.mobile.hall_settings import Capacity, Drag, Load, Voltage, hall_of
 from foosim.library.mobile.rover import CHARGE, Charge, RoverRobot
 from foosim.library.mobile.station import StationRobot
+from foosim.world.component_types.quantities import Share, Volts
+from foosim.world.component_types.registry import rule, sensor
+from foosim.world.component_types.settings import EntityRuleSettings, SensorSettings, Tag
 from foosim.world.components.base import EntityRule, Sensor, slot
 from foosim.world.components.entities import Marked, MarkKind
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
-from foosim.world.forms.quantities import Share, Volts
-from foosim.world.forms.registry import rule, sensor
-from foosim.world.forms.settings import EntityRuleSettings, SensorSettings, Tag
 from foosim.world.layout import Entity
 from foosim.world.placing import Coordinate
 from foosim.world.spec import WorldSpec

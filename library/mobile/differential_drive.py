@@ -14,11 +14,11 @@ from foosim.library.mobile.set_points import set_points_of
 from foosim.library.mobile.vehicles import body_of, is_in_reach, set_down, upright
 from foosim.library.mobile.wheels import WheelMotors, Wheels, slips_of, wheels_of
 from foosim.library.rigid.primitives import RIGID
+from foosim.world.component_types.descriptions import BODY, JOINTS
+from foosim.world.component_types.registry import model
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, Slot, WritableView
-from foosim.world.forms.forms import BODY, JOINTS
-from foosim.world.forms.registry import model
 from foosim.world.layout import Entity
 from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay

@@ -10,13 +10,13 @@ from foosim.common.spec_base import Length, default
 from foosim.library.mobile.holonomic import HolonomicRobot
 from foosim.library.mobile.steering import AHEAD_RAD, NOTHING_FELT, Feelers, Steering, shorter, steered
 from foosim.library.mobile.wheels import wheels_of
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.quantities import JobNumber, Metres
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.quantities import JobNumber, Metres
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.progress import Approach, Patience
 from foosim.world.moving.upright import made_model
 from foosim.world.placing import FAR_M

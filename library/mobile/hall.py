@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 from foosim.common.finding import Finding
 from foosim.library.mobile.hall_obstacles import obstacles_of, start_findings
 from foosim.library.mobile.hall_settings import HALL, Hall, HallWalls, Side, hall_findings
+from foosim.world.component_types.registry import kit, scene
+from foosim.world.component_types.settings import SceneSettings
 from foosim.world.components.base import Kit
-from foosim.world.forms.registry import kit, scene
-from foosim.world.forms.settings import SceneSettings
 from foosim.world.matter.materials import CONCRETE
 from foosim.world.scene import Box, Colour, Shape, Vector
 from foosim.world.spec import WorldSpec

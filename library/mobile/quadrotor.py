@@ -6,9 +6,9 @@ from typing import Final
 
 from foosim.library.mobile.rotors import QuadrotorRobot
 from foosim.library.rigid.primitives import RIGID
+from foosim.world.component_types.registry import model
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.registry import model
 from foosim.world.matter.materials import PLASTIC
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape
 

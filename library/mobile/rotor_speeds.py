@@ -12,12 +12,12 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from foosim.library.mobile.rotors import QuadrotorRobot
+from foosim.world.component_types.quantities import RadiansPerSecond
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, slot
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.quantities import RadiansPerSecond
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 
 Speeds = Annotated[tuple[RadiansPerSecond, ...], Meta(min_length=4, max_length=4)]
 

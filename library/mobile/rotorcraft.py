@@ -26,11 +26,11 @@ from foosim.library.mobile.vehicles import (
     set_down,
     upright,
 )
+from foosim.world.component_types.descriptions import BODY
+from foosim.world.component_types.registry import model
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.forms import BODY
-from foosim.world.forms.registry import model
 from foosim.world.layout import Entity
 from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay

@@ -11,7 +11,7 @@ from pydantic import Field
 from foosim.common import units
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
-from foosim.world.forms.settings import RobotSettings
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.matter.physics import DEFAULT
 from foosim.world.placing import At
 

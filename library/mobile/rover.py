@@ -13,10 +13,10 @@ from foosim.library.mobile.differential_drive import WheeledMotion
 from foosim.library.mobile.hall_bodies import DARK, mast, standing
 from foosim.library.mobile.hall_settings import Place, hall_of
 from foosim.library.mobile.wheels import Wheels, slips_of
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.moving.upright import Upright
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Shape, turn

@@ -7,10 +7,10 @@ from typing import Final
 
 from foosim.library.mobile.hall_bodies import mast, standing
 from foosim.library.mobile.hall_settings import Place, hall_of
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.matter.materials import METAL
 from foosim.world.scene import Body, Colour, Cylinder, Shape
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Annotated
 from msgspec import Meta, Struct
 
 from foosim.library.mobile.wheels import wheels_of
+from foosim.world.component_types.quantities import MetresPerSecond
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.quantities import MetresPerSecond
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 
 if TYPE_CHECKING:  # only processes that compute ticks need numpy
     from foosim.library.mobile.set_points import MotionSetPoints

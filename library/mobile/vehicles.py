@@ -11,8 +11,8 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
 from foosim.library.mobile.hall_bodies import DARK, mast
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.matter.physics import DEFAULT
 from foosim.world.moving.upright import Upright

@@ -11,13 +11,13 @@ from foosim.common.exact_math import PI
 from foosim.common.spec_base import default
 from foosim.library.mobile.rotorcraft import RotorcraftRobot
 from foosim.library.mobile.steering import shorter
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.quantities import JobNumber, Metres, Radians
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.quantities import JobNumber, Metres, Radians
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.progress import Approach, Patience
 from foosim.world.placing import FAR_M
 

@@ -8,11 +8,11 @@ from msgspec import Meta, Struct
 
 from foosim.common.exact_math import hypot
 from foosim.library.mobile.holonomic import HolonomicRobot
+from foosim.world.component_types.quantities import MetresPerSecond
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, slot
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.quantities import MetresPerSecond
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 
 
 class XYWSettings(ActuatorSettings):

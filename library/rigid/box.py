@@ -7,8 +7,8 @@ from typing import Annotated
 from pydantic import Field
 
 from foosim.library.rigid.primitives import RIGID, Extent, ObjectSettings, RigidObject
+from foosim.world.component_types.registry import model
 from foosim.world.components.view import Mounting
-from foosim.world.forms.registry import model
 from foosim.world.scene import Box
 
 

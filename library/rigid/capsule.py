@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from foosim.library.rigid.primitives import RIGID, Extent, ObjectSettings, RigidObject
+from foosim.world.component_types.registry import model
 from foosim.world.components.view import Mounting
-from foosim.world.forms.registry import model
 from foosim.world.scene import Capsule
 
 

@@ -8,12 +8,12 @@ from msgspec import Meta, Struct
 
 from foosim.common import units
 from foosim.common.units import Quantity
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, slot
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.scene import conjugate, rotate
 
 Newtons: TypeAlias = Annotated[float, Meta(extra={"unit": "N"})]

@@ -11,16 +11,16 @@ from typing import ClassVar, Final
 
 from msgspec import Struct
 
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ENGINES, ENTITY, NO_ENTITY
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.quantities import JobNumber, Share
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.grasping import GripperSettings, Portable, distance_from, grasp_of, portables_of
 from foosim.world.components.mounted import body_at, link_index
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
-from foosim.world.forms import registry
-from foosim.world.forms.forms import ENGINES, ENTITY, NO_ENTITY
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.quantities import JobNumber, Share
-from foosim.world.forms.registry import actuator
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, rotate
 

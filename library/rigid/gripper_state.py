@@ -6,12 +6,12 @@ from msgspec import Struct
 
 from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import Name, default
+from foosim.world.component_types.quantities import Kilograms, Share
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.grasping import portables_of
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
-from foosim.world.forms.quantities import Kilograms, Share
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 
 
 class GripperStateSettings(SensorSettings):

@@ -11,8 +11,8 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.units import Quantity, custom_error
 from foosim.library.rigid.primitives import RIGID, ObjectSettings, RigidObject
+from foosim.world.component_types.registry import model
 from foosim.world.components.view import Mounting
-from foosim.world.forms.registry import model
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Hull
 

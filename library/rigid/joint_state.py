@@ -9,12 +9,12 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import Name
+from foosim.world.component_types.descriptions import JOINTS
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import joint_indices
 from foosim.world.components.view import Mounting, SlotReadings, View
-from foosim.world.forms.forms import JOINTS
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 
 JOINTS_MAX: Final = 256
 Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_MAX)]

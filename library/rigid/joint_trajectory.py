@@ -12,12 +12,12 @@ from pydantic import Field
 from foosim.common.spec_base import default
 from foosim.library.rigid.joints import JointActuator, JointLoopSettings, Positions, joint_count
 from foosim.library.rigid.spline import fastest, position_at
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.quantities import JobNumber
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.base import slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.quantities import JobNumber
-from foosim.world.forms.registry import actuator
 from foosim.world.moving.progress import Patience
 
 POINTS_MAX: Final = 256

@@ -5,9 +5,9 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.library.rigid.joints import JointActuator, JointSettings, Velocities
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import View, WritableView
-from foosim.world.forms.registry import actuator
 
 
 class JointVelocitySettings(JointSettings):

@@ -13,12 +13,12 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
+from foosim.world.component_types.descriptions import JOINTS_MAX, Carrier
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, joint_indices
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.forms import JOINTS_MAX, Carrier
-from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.scene import Link
 
 FORCE_MAX: Final = 1e6

@@ -10,13 +10,13 @@ from msgspec import Struct
 from foosim.common.exact_math import atan2
 from foosim.library.rigid.joints import JointActuator
 from foosim.library.rigid.pan_tilt import PanTiltSettings, hangs_on, pan_tilt_of
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.quantities import JobNumber, Metres
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.base import slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, link_index
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.quantities import JobNumber, Metres
-from foosim.world.forms.registry import actuator
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.moving.progress import Approach
 from foosim.world.placing import FAR_M, FIRST_LINK, MountedAt

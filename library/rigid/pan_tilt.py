@@ -13,12 +13,12 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.library.rigid.joints import JointActuator, JointGroup, JointLoopSettings
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.quantities import JobNumber, Radians
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.quantities import JobNumber, Radians
-from foosim.world.forms.registry import actuator
 from foosim.world.moving.progress import Approach, Patience
 from foosim.world.scene import Body
 

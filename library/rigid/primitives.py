@@ -11,10 +11,10 @@ from foosim.common import units
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
 from foosim.world.bodies.inertia import principal_of, solid
+from foosim.world.component_types.descriptions import BODY, CONTACTS, PARTNERS, RESTING
+from foosim.world.component_types.settings import EntitySettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.forms import BODY, CONTACTS, PARTNERS, RESTING
-from foosim.world.forms.settings import EntitySettings
 from foosim.world.matter.materials import UNKNOWN, Radio
 from foosim.world.matter.physics import DEFAULT
 from foosim.world.placing import At

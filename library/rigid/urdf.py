@@ -13,11 +13,11 @@ from foosim.common.errors import BadValue
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.bodies.urdf import SUFFIX, Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
+from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.placing import At
 from foosim.world.scene import Body, Link
 from foosim.world.scenery import AssetPath

@@ -9,12 +9,12 @@ from msgspec import Struct
 
 from foosim.common.errors import BadValue
 from foosim.library.table.settings import table_of
+from foosim.world.component_types.descriptions import BODY, CONTACTS
+from foosim.world.component_types.quantities import Metres
+from foosim.world.component_types.registry import model, sensor
+from foosim.world.component_types.settings import RobotSettings, SensorSettings
 from foosim.world.components.base import Model, Sensor
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.forms import BODY, CONTACTS
-from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import model, sensor
-from foosim.world.forms.settings import RobotSettings, SensorSettings
 from foosim.world.matter.materials import PLASTIC
 from foosim.world.scene import ORIGIN, Body, Colour, Link, Shape, Sphere, Vector
 

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from foosim.world.component_types.quantities import Metres, MetresPerSecond, RadiansPerSecond
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import Metres, MetresPerSecond, RadiansPerSecond
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 
 
 class BallStateSettings(SensorSettings):

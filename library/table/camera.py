@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 
 
 class CameraRobot(RobotSettings):

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
+from foosim.world.component_types.quantities import Metres, Radians
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor, need
 from foosim.world.components.view import SlotReadings, View
-from foosim.world.forms.quantities import Metres, Radians
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 
 
 class EncoderSettings(SensorSettings):

@@ -9,12 +9,12 @@ from msgspec import Meta, Struct
 
 from foosim.library.table.rod import RodRobot, figure_ys
 from foosim.library.table.settings import table_of
+from foosim.world.component_types.descriptions import NO_ENTITY, TOUCHES, TOUCHES_MAX
+from foosim.world.component_types.quantities import Count, NewtonSeconds
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.forms import NO_ENTITY, TOUCHES, TOUCHES_MAX
-from foosim.world.forms.quantities import Count, NewtonSeconds
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 
 TUBE: Final = 0.0
 """The link that has the tube."""

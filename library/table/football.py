@@ -12,12 +12,12 @@ from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.library.table.ball import Ball
 from foosim.library.table.rod import RodRobot, line_x_m
 from foosim.library.table.settings import TEAMS, places_between_lines, rod_reach, table_of
+from foosim.world.component_types.descriptions import ENTITY, NO_ENTITY
+from foosim.world.component_types.registry import rule
+from foosim.world.component_types.settings import RuleSettings
 from foosim.world.components.base import Rule, slot
 from foosim.world.components.entities import Marked, MarkKind, RuleMounting, mounting_of
 from foosim.world.components.view import View, WritableView
-from foosim.world.forms.forms import ENTITY, NO_ENTITY
-from foosim.world.forms.registry import rule
-from foosim.world.forms.settings import RuleSettings
 from foosim.world.layout import WORLD, Entity
 from foosim.world.scene import ORIGIN, Vector
 from foosim.world.spec import WorldSpec

@@ -6,8 +6,8 @@ from math import sqrt
 from typing import Final
 
 from foosim.library.table.settings import TABLE, Floor, Goal, Playfield, Ramps, Strips, Table, Walls
-from foosim.world.forms.registry import scene
-from foosim.world.forms.settings import SceneSettings
+from foosim.world.component_types.registry import scene
+from foosim.world.component_types.settings import SceneSettings
 from foosim.world.matter import materials
 from foosim.world.scene import Box, Colour, Shape, Vector
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 
 from foosim.library.table.rod_drives import ForceConstant, RodVoltageSettings, TorqueConstant
+from foosim.world.component_types.quantities import Amperes
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor, need
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
-from foosim.world.forms.quantities import Amperes
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
 
 if TYPE_CHECKING:  # only processes that compute ticks need numpy
     import numpy as np

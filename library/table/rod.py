@@ -8,11 +8,11 @@ from typing import Final
 
 from foosim.library.table.rod_drives import RodVoltageSettings
 from foosim.library.table.settings import Line, LineName, Table, Team, table_of
+from foosim.world.component_types.descriptions import CONTACTS, JOINTS, TOUCHES
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.forms import CONTACTS, JOINTS, TOUCHES
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.scene import Body, Box, Colour, Cylinder, Link, Quaternion, Shape, Vector
 from foosim.world.spec import WorldSpec

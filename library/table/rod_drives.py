@@ -15,9 +15,9 @@ from foosim.common import units
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
 from foosim.library.table.settings import table_of
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.settings import ActuatorSettings
 from foosim.world.moving.upright import made_model
 from foosim.world.scene import load_of
 

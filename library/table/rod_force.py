@@ -8,11 +8,11 @@ from typing import ClassVar
 from msgspec import Struct
 
 from foosim.library.table.rod_drives import RodLimits, RodSetPoint
+from foosim.world.component_types.quantities import NewtonMetres, Newtons
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import NewtonMetres, Newtons
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 
 
 class RodForceSettings(ActuatorSettings):

@@ -12,11 +12,11 @@ from msgspec import Struct
 
 from foosim.library.table.rod_drives import RodLimits
 from foosim.library.table.settings import table_of
+from foosim.world.component_types.quantities import Metres, Radians
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.quantities import Metres, Radians
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 
 ANGLE_RAD_MAX: Final = 1000.0
 """The greatest angle of a rod's set-point."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.library.table.rod_drives import RodLimits, RodSetPoint
+from foosim.world.component_types.quantities import MetresPerSecond, RadiansPerSecond
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View
-from foosim.world.forms.quantities import MetresPerSecond, RadiansPerSecond
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 
 
 class RodVelocitySettings(ActuatorSettings):

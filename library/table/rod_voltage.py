@@ -10,10 +10,10 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.library.table.rod_drives import RodLimits, RodSetPoint, RodVoltageSettings
+from foosim.world.component_types.quantities import Volts
+from foosim.world.component_types.registry import actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
-from foosim.world.forms.quantities import Volts
-from foosim.world.forms.registry import actuator
 
 
 class RodVoltages(Struct, frozen=True):

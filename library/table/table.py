@@ -12,9 +12,9 @@ from foosim.library.table.rod import RodRobot, line_x_m
 from foosim.library.table.settings import TABLE, Surface, Table
 from foosim.library.table.table_checks import table_findings
 from foosim.library.table.table_presets import PRESETS
+from foosim.world.component_types.registry import kit
 from foosim.world.components.base import Kit
 from foosim.world.components.reach import MARGIN_M, Reach
-from foosim.world.forms.registry import kit
 from foosim.world.layout import Layout
 from foosim.world.matter.physics import DEFAULT, Contact, Physics, Side
 from foosim.world.scene import Shape

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import AnyEngine
-from foosim.world.forms import registry
+from foosim.world.component_types import registry
 from foosim.world.layout import Entity, Layout
 
 

@@ -33,8 +33,8 @@ from foosim.world.air import air_of
 from foosim.world.assembly.sections import physics_of
 from foosim.world.assembly.volumes import Volumes, is_felt
 from foosim.world.assembly.world import build_scene
+from foosim.world.component_types.descriptions import NO_ENTITY, PARTNERS_MAX
 from foosim.world.components.drives import Drives, Motor, share_of
-from foosim.world.forms.forms import NO_ENTITY, PARTNERS_MAX
 from foosim.world.kinematics import twist
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import AssetError, Mesh

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import fsum
 
-from foosim.world.forms.forms import NO_ENTITY, TOUCHES_MAX
+from foosim.world.component_types.descriptions import NO_ENTITY, TOUCHES_MAX
 from foosim.world.layout import Entity
 
 

@@ -7,10 +7,10 @@ from typing import Any, Final
 
 from foosim.deployment.loader import expanded_text, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.layout import build_layout
 
 COMING_MAX: Final = 64

@@ -22,14 +22,14 @@ from foosim.deployment.schema import Deployment
 from foosim.simulation.check.changes import changed, with_comings
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings, System
-from foosim.world.assembly.used_forms import forms_of
+from foosim.world.assembly.versions import forms_of
 from foosim.world.assembly.world import World, commands_together
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ComponentType
 from foosim.world.components.fitted import BoundActuator, BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, View, called, has_together, some_together
 from foosim.world.components.watching import ReadOnly
-from foosim.world.forms import registry
-from foosim.world.forms.forms import ComponentType
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout, build_layout
 

@@ -13,9 +13,9 @@ from jsonschema import Draft202012Validator
 from foosim.cli.components import chosen
 from foosim.common.errors import DeploymentError, UnknownName
 from foosim.deployment.loader import apply_sets
-from foosim.world.forms.registry import FORMS, names
+from foosim.world.component_types.registry import FORMS, names
 from tests.conftest import Typed
-from tests.own_forms import folder_on_path
+from tests.own_components import folder_on_path
 
 Telling = Callable[..., tuple[str, str]]
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -26,10 +26,10 @@ from msgspec import Struct
 from pydantic import Field
 
 from foosim.common.spec_base import SpecBase
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import Sensor
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 
 print("said at import")
 

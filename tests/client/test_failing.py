@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from foosim.cli.capture.command import app as replay_app
 from foosim.cli.rehearse import app
-from foosim.world.forms.failures import failure_of
+from foosim.world.component_types.failures import failure_of
 from tests.turns import BY_PERIOD
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"

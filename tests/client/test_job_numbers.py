@@ -17,10 +17,10 @@ from foosim.client.vectors import CommandVector
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.library.mobile.go_to import Place
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
 from foosim.world.components.job_reading import Jobs as Reading
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
 from tests.kinematic_yard import yard_text
 
 GUIDE: Final = Path(__file__).parents[2] / "docs" / "how-to" / "give_jobs.md"

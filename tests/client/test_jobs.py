@@ -14,7 +14,7 @@ from foosim.client.errors import JobCancelled, JobFailed, JobPreempted, JobUnfin
 from foosim.common.units import Pace
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
-from foosim.world.forms.jobs import JobState
+from foosim.world.component_types.jobs import JobState
 from foosim.world.frame import Frame
 from tests.client.scripted import Program, refused
 from tests.heads import folder, head

@@ -16,7 +16,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.simulation.verify import verify_capture
-from foosim.world.forms.jobs import JobState
+from foosim.world.component_types.jobs import JobState
 from foosim.world.layout import build_layout
 from tests.client.scripted import Program, refused
 from tests.kinematic_yard import yard_text

@@ -18,16 +18,16 @@ from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import FAILED, mark_kinds
 from foosim.world.frame import Frame
 from tests.console.memory import TABLE
-from tests.own_forms import folder_on_path
+from tests.own_components import folder_on_path
 
 FORMS: Final = """
 import sys
 import numpy as np
 from msgspec import Struct
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import EntityRule, Rule, Sensor
-from foosim.world.forms.registry import rule, sensor
-from foosim.world.forms.settings import *
+from foosim.world.component_types.registry import rule, sensor
+from foosim.world.component_types.settings import *
 
 acts = {}
 

@@ -17,7 +17,7 @@ from foosim.library.mobile.hall_settings import hall_of
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Commit
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.forms.forms import ABSENT
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from tests.console.memory import TABLE, table_with_spares

@@ -12,7 +12,7 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import build_scene
-from foosim.world.forms.forms import ABSENT
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout

@@ -27,9 +27,9 @@ from foosim.library.table.encoder import EncoderSettings
 from foosim.library.table.rod import RodRobot
 from foosim.library.table.settings import LINE_NAMES, TEAMS, table_of
 from foosim.runtime.supervisor_timeout import UNKNOWN_NS
-from foosim.world.forms.per_field import numbers_of, read_per_field
-from foosim.world.forms.registry import find, find_component, find_engine, find_model
-from foosim.world.forms.settings import ComponentSettings
+from foosim.world.component_types.per_field import numbers_of, read_per_field
+from foosim.world.component_types.registry import find, find_component, find_engine, find_model
+from foosim.world.component_types.settings import ComponentSettings
 from tests.deployment.halls import BATTERY, PATROL, POSE, hall
 from tests.turns import BY_PERIOD
 

@@ -18,10 +18,10 @@ from foosim.common.names import NAME_RULE
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.simulation.run import rehearse
-from foosim.world.forms import registry
+from foosim.world.component_types import registry
 from foosim.world.layout import build_layout
 from tests.kinematic_yard import yard_text
-from tests.own_forms import TABLE, folder_on_path, problems, written
+from tests.own_components import TABLE, folder_on_path, problems, written
 
 TEXT: Final = TABLE.read_text()
 WAREHOUSE: Final = (TABLE.parent / "warehouse.yaml").read_text()

@@ -23,9 +23,9 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.simulation.check.component_check import ComponentCheck
 from foosim.simulation.run import rehearse
-from foosim.world.forms import registry
-from foosim.world.forms.forms import ComponentType
-from foosim.world.forms.registry import FORMS
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ComponentType
+from foosim.world.component_types.registry import FORMS
 from tests.forms.worlds import DEPLOY, HALL, SCENE, TABLE, Place, World, scene
 from tests.frames import broken_laws
 from tests.whole_worlds import NAME, assets, mixed, written, yard

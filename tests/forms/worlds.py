@@ -16,10 +16,10 @@ from foosim.client.player import Player, Samples, Turn
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.yaml import write_yaml
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import SAMPLES
+from foosim.world.component_types.payloads import PayloadCodec
 from foosim.world.components.fitted import actuators_of
-from foosim.world.forms import registry
-from foosim.world.forms.forms import SAMPLES
-from foosim.world.forms.payloads import PayloadCodec
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 

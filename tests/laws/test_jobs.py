@@ -19,9 +19,9 @@ from foosim.deployment.schema import Deployment
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.simulation.verify import verify_capture
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
 from foosim.world.frame import Frame
 from tests.heads import folder, head
 from tests.kinematic_yard import yard_text

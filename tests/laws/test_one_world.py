@@ -44,12 +44,12 @@ from foosim.simulation.what_if import what_if
 from foosim.vhub.state.records import Closing
 from foosim.world.assembly.islands import Assignment, Share, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.rest import Rest
-from foosim.world.assembly.used_forms import forms_of
+from foosim.world.assembly.versions import forms_of
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.assembly.world import initial_numbers
+from foosim.world.component_types.descriptions import NO_ENTITY
 from foosim.world.components.reach import Island, Reach
 from foosim.world.edits import counters, parked
-from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, build_layout
 from tests.forms.test_forms import ALONE, own

@@ -18,8 +18,8 @@ from foosim.node.edited_frame import edit
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
 from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.component_types.descriptions import NO_ENTITY
 from foosim.world.edits import Remove
-from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from tests.forms.worlds import HALL, TABLE, World, driver
 from tests.frames import Frames, broken_laws
@@ -31,10 +31,10 @@ READERS: Final = """
 from foosim.library.mobile.wheel_speeds import Drive, DriveActuator
 from msgspec import Struct
 from foosim.world.components.surroundings import Surroundings
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import EntityRule, Sensor, need, slot
-from foosim.world.forms.registry import actuator, rule, sensor
-from foosim.world.forms.settings import ActuatorSettings, EntityRuleSettings, SensorSettings
+from foosim.world.component_types.registry import actuator, rule, sensor
+from foosim.world.component_types.settings import ActuatorSettings, EntityRuleSettings, SensorSettings
 
 
 @rule("follows", EntityRuleSettings)

@@ -19,8 +19,8 @@ from foosim.library.table.settings import table_of
 from foosim.simulation.run import rehearse
 from foosim.world.assembly import world
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.forms import registry
-from foosim.world.forms.forms import ENGINES
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ENGINES
 from foosim.world.layout import build_layout
 from foosim.world.scene import Scene, Sphere, Vector
 from tests.placing import place_ball
@@ -29,7 +29,7 @@ from tests.shared_engine import make_shared_engine
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
 STILL: Final = '''
-from foosim.world.forms.forms import ENGINES, Engine
+from foosim.world.component_types.descriptions import ENGINES, Engine
 
 
 class Still:
@@ -88,8 +88,8 @@ def problem(*sets: str) -> str:
 def test_names_of_engines_import_nothing_that_they_need() -> None:
     code = """
 import json, sys
-from foosim.world.forms import registry
-from foosim.world.forms.forms import ENGINES
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ENGINES
 heavy = ("numpy", "pybullet", "foosim.node.physics.interface", "foosim.deployment.schema")
 print(json.dumps([*registry.engines(), *[name for name in heavy if name in sys.modules]]))
 """

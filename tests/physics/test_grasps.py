@@ -17,8 +17,8 @@ from foosim.library.rigid.gripper import GraspFailure, Grip
 from foosim.library.rigid.gripper_state import GripperState
 from foosim.simulation.simulation import Simulation
 from foosim.world.assembly.volumes import Volumes
+from foosim.world.component_types.jobs import JobState
 from foosim.world.components.grasping import grasp_of
-from foosim.world.forms.jobs import JobState
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate

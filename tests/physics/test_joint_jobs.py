@@ -23,10 +23,10 @@ from foosim.deployment.schema import Deployment
 from foosim.library.rigid.joint_trajectory import JointTrajectory, TrajectoryFailure
 from foosim.library.rigid.spline import fastest, position_at
 from foosim.simulation.simulation import Simulation
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
 from foosim.world.components.fitted import actuators_of
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
 from foosim.world.layout import build_layout
 from tests.forms.worlds import DEPLOY
 from tests.heads import EYE_M, TILT_M, folder, head

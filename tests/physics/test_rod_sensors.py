@@ -12,11 +12,11 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets
 from foosim.library.table.rod import figure_ys
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import SensingView
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
 from tests.physics.test_rod_drives import SEED, STILL, TABLE, TEXT, Driven
 from tests.placing import place_ball
 

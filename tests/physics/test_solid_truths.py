@@ -344,7 +344,7 @@ PARTS: Final = "".join(
 )
 OWN_SPIN: Final = """
 from foosim.library.rigid.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
-from foosim.world.forms.registry import actuator
+from foosim.world.component_types.registry import actuator
 
 class SpinSettings(JointVelocitySettings): pass
 

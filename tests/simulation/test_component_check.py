@@ -36,11 +36,11 @@ from msgspec import Struct
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import Mounting
-from foosim.world.forms.forms import ENTITY
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.descriptions import ENTITY
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import EntityRule, Rule, Sensor, need, slot
-from foosim.world.forms.registry import rule, sensor
-from foosim.world.forms.settings import RuleSettings, SensorSettings
+from foosim.world.component_types.registry import rule, sensor
+from foosim.world.component_types.settings import RuleSettings, SensorSettings
 
 
 class Number(Struct, frozen=True):

@@ -23,9 +23,9 @@ from foosim.common.errors import BadValue, Failed
 from foosim.common.json_text import encode_json
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.table.rod_position import Command
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
-from tests.own_forms import folder_on_path, written
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
+from tests.own_components import folder_on_path, written
 from tests.simulation.conftest import TABLE, TICK_NS, damaged, messages_of, replay, rewritten, with_row
 
 KINDS: Final = {
@@ -71,7 +71,7 @@ def test_commands_have_their_numbers(run: Path, tmp_path: Path) -> None:
 
 
 OWN_ACTUATOR: Final = """
-from foosim.world.forms.quantities import Newtons
+from foosim.world.component_types.quantities import Newtons
 
 
 class Pull(Struct, frozen=True):

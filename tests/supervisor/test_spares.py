@@ -17,8 +17,8 @@ from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Epoch
 from foosim.world.assembly.world import initial_numbers
+from foosim.world.component_types.descriptions import NO_ENTITY
 from foosim.world.edits import Remove, parked
-from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from foosim.world.robot_packets import Delivered

@@ -11,10 +11,10 @@ from foosim.vhub.state.records import Closing
 from foosim.world.assembly.event_times import events_by_tick
 from foosim.world.assembly.grippers import Gripper, grippers_of
 from foosim.world.assembly.volumes import Volumes
+from foosim.world.component_types.jobs import CHANGED, NUMBERS, RUNNING, STATES, JobState
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
 from foosim.world.edits import Disrupt, Set, counters, parked
-from foosim.world.forms.jobs import CHANGED, NUMBERS, RUNNING, STATES, JobState
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 from foosim.world.setting.settable import QUARANTINED

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Final
 
 from foosim.simulation.system import System
-from foosim.world.forms.jobs import RUNNING
+from foosim.world.component_types.jobs import RUNNING
 from foosim.world.setting.settable import AT, settable
 from tests.swarm.faults import Dice, Fault, ask, end_node, random_tick, revive
 

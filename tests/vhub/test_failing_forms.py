@@ -13,16 +13,16 @@ from typing import Any, Final
 import pytest
 
 from foosim.simulation.run import rehearse
-from tests.own_forms import folder_on_path
+from tests.own_components import folder_on_path
 
 FORMS: Final = """
 import sys
 from msgspec import Struct
 from foosim import Player
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import Model, Sensor
-from foosim.world.forms.registry import model, sensor
-from foosim.world.forms.settings import RobotSettings, SensorSettings
+from foosim.world.component_types.registry import model, sensor
+from foosim.world.component_types.settings import RobotSettings, SensorSettings
 from foosim.world.scene import ORIGIN, Body, Box, Link, Shape
 
 acts = {}

@@ -19,11 +19,11 @@ from foosim.capture.export import export_capture
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.library.generic.laser_scanner import LaserScannerSettings, directions
 from foosim.simulation.run import rehearse
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.view import SensingView
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component
-from tests.own_forms import TABLE, folder_on_path, written
+from tests.own_components import TABLE, folder_on_path, written
 
 SETS: Final = (
     "robots.rover01.sensors.place={kind: pose_3d, rate: 50 Hz, at: {x: 20 cm, z: 50 cm}}",

@@ -404,10 +404,10 @@ def test_a_run_waits_for_what_is_started_by_hand_and_ends_in_order_when_a_requir
 DOZES: Final = """
 import time
 from msgspec import Struct
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import Sensor
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 
 
 class Nothing(Struct, frozen=True):

@@ -9,12 +9,12 @@ from typing import Final
 
 from foosim.deployment.loader import load_deployment
 from foosim.world.assembly.world import initial_numbers
+from foosim.world.component_types.registry import model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.fitted import BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import Mounting, SensingView, WritableView
-from foosim.world.forms.registry import model
-from foosim.world.forms.settings import RobotSettings
 from foosim.world.layout import build_layout
 from foosim.world.scene import ORIGIN, Body, Link, Quaternion, Vector
 

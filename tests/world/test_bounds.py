@@ -7,9 +7,9 @@ from math import inf, nan
 import pytest
 from msgspec import Struct
 
+from foosim.world.component_types.payloads import PayloadCodec
 from foosim.world.components.base import Actuator
 from foosim.world.components.bounds import CommandBounds
-from foosim.world.forms.payloads import PayloadCodec
 
 
 class Speeds(Struct, frozen=True):

@@ -19,11 +19,11 @@ from yaml import safe_load
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
-from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.assembly.versions import foreign_versions
 from foosim.world.assembly.world import WorldMarks
 from tests.conftest import Command, Typed
 from tests.frames import Frames
-from tests.own_forms import folder_on_path, forget_modules
+from tests.own_components import folder_on_path, forget_modules
 
 ROOT: Final = Path(__file__).parents[2]
 GUIDES: Final = [ROOT / "docs" / "how-to" / name for name in ("write_a_sensor.md", "extending.md")]

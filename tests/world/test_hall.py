@@ -16,8 +16,8 @@ from foosim.library.mobile.hall_obstacles import obstacles_of, start_findings
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.islands import Assignment, table_reach_of
 from foosim.world.assembly.world import build_scene, initial_numbers, world_status
+from foosim.world.component_types.registry import names
 from foosim.world.edits import Add, Edit, Push, Remove, Set, fitting_edits
-from foosim.world.forms.registry import names
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.rays.outlines import Circle, Rectangle, outline

@@ -18,10 +18,10 @@ from foosim.simulation.run import rehearse
 from foosim.simulation.simulation import Simulation
 from foosim.simulation.system import Settings, System
 from foosim.world.assembly.world import WorldMarks
+from foosim.world.component_types.registry import find_model
 from foosim.world.components.fitted import sensors_of
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import SensingView, View
-from foosim.world.forms.registry import find_model
 from foosim.world.frame import Frame
 from foosim.world.setting.settable import settable
 from tests.kinematic_yard import TICK_S, yard_text

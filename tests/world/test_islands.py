@@ -18,7 +18,7 @@ from foosim.library.table.rod import RodRobot
 from foosim.library.table.settings import table_of
 from foosim.world.assembly.islands import Assignment, islands_of, table_reach_of, touching_of
 from foosim.world.assembly.world import initial_numbers
-from foosim.world.forms.forms import ABSENT
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.layout import Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

@@ -16,14 +16,14 @@ from foosim.deployment.loader import load_deployment
 from foosim.library.mobile.go_to import Place
 from foosim.library.mobile.waypoint import Waypoint
 from foosim.simulation.simulation import Simulation
+from foosim.world.component_types import registry
+from foosim.world.component_types.jobs import JobState
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.component_types.quantities import JobNumber, Metres
+from foosim.world.component_types.registry import actuator
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator
 from foosim.world.components.job_reading import Jobs
-from foosim.world.forms import registry
-from foosim.world.forms.jobs import JobState
-from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.quantities import JobNumber, Metres
-from foosim.world.forms.registry import actuator
-from foosim.world.forms.settings import ActuatorSettings
 from tests.kinematic_yard import yard_text
 
 NAME: Final = "yard.yaml"

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.library.table.table import BALL
+from foosim.world.component_types.descriptions import ABSENT
+from foosim.world.component_types.registry import find_model, names
 from foosim.world.components.view import Mounting
-from foosim.world.forms.forms import ABSENT
-from foosim.world.forms.registry import find_model, names
 from foosim.world.layout import NOTHING, WORLD, Carried, Declared, Layout, build_layout
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

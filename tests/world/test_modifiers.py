@@ -182,10 +182,10 @@ def test_modifiers_work_in_their_order_and_one_of_a_kind_is_not_the_other() -> N
 FAILING: Final = '''
 from msgspec import Struct
 
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import Sensor
-from foosim.world.forms.registry import sensor
-from foosim.world.forms.settings import SensorSettings
+from foosim.world.component_types.registry import sensor
+from foosim.world.component_types.settings import SensorSettings
 
 
 class Settings(SensorSettings):

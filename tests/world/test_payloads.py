@@ -56,10 +56,10 @@ from foosim.library.table.rod_force import RodForce
 from foosim.library.table.rod_position import Command
 from foosim.library.table.rod_velocity import RodVelocity
 from foosim.library.table.rod_voltage import RodVoltages
+from foosim.world.component_types.payloads import PayloadCodec, field_at
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import find_component, names
 from foosim.world.components.job_reading import Jobs
-from foosim.world.forms.payloads import PayloadCodec, field_at
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import find_component, names
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 DEPLOYMENT = load_deployment(TABLE.read_text(), TABLE.name)

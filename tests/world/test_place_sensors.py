@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.world.earth import SEMI_MAJOR_M, EarthOrigin, Geodesy, to_ecef, to_geodetic
 from foosim.world.scene import Vector, multiply, rotate
-from tests.own_forms import problems
+from tests.own_components import problems
 from tests.world.free_body import Reader, about_y, about_z, text_with
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"

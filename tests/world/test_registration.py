@@ -12,10 +12,10 @@ import pytest
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.validate import models_of
-from foosim.world.forms import registry
-from foosim.world.forms.registry import find, find_model
+from foosim.world.component_types import registry
+from foosim.world.component_types.registry import find, find_model
 from foosim.world.layout import build_layout
-from tests.own_forms import folder_on_path, problems, written
+from tests.own_components import folder_on_path, problems, written
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 TEXT: Final = TABLE.read_text()
@@ -162,7 +162,7 @@ def test_what_a_broken_module_has_imported_before_stays_registered(site: Path) -
     code = """
 import json
 from foosim.common.errors import BadValue
-from foosim.world.forms.registry import find
+from foosim.world.component_types.registry import find
 for kind in ("own_broken:Own", "own_broken:Own"):
     try:
         find("sensor", kind)

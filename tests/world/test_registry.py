@@ -23,9 +23,9 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings
-from foosim.world.forms import registry
-from foosim.world.forms.per_field import codec_of
-from foosim.world.forms.registry import FORMS, find, find_component, names
+from foosim.world.component_types import registry
+from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import FORMS, find, find_component, names
 from foosim.world.frame import Frame
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -38,10 +38,10 @@ from msgspec import Struct
 from pydantic import Field
 
 from foosim.common.spec_base import LengthNoise
-from foosim.world.forms.settings import SensorSettings
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.settings import SensorSettings
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import Sensor
-from foosim.world.forms.registry import sensor
+from foosim.world.component_types.registry import sensor
 
 
 class ReachSettings(SensorSettings):
@@ -75,10 +75,10 @@ class Idle:
 TELLERS: Final = '''
 from msgspec import Struct
 
-from foosim.world.forms.settings import SensorSettings
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.settings import SensorSettings
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import Sensor
-from foosim.world.forms.registry import sensor
+from foosim.world.component_types.registry import sensor
 
 
 class Told(Struct, frozen=True):
@@ -106,9 +106,9 @@ from typing import Annotated
 from msgspec import Meta, Struct
 from pydantic import Field
 
-from foosim.world.forms.settings import ActuatorSettings
+from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, need, slot
-from foosim.world.forms.registry import actuator
+from foosim.world.component_types.registry import actuator
 
 
 class WinchSettings(ActuatorSettings):
@@ -211,7 +211,7 @@ def install(folder: Path, name: str, *modules: str, version: str = "1.2") -> Non
 BEGIN: Final = """
 import json, sys
 from foosim.common.errors import Refused
-from foosim.world.forms.registry import find, names
+from foosim.world.component_types.registry import find, names
 
 def said(form, kind):
     try:

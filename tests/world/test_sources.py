@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import pytest
 
-from foosim.world.assembly import used_forms
-from foosim.world.assembly.used_forms import sources_of
+from foosim.world.assembly import versions
+from foosim.world.assembly.versions import sources_of
 
 FILES: Final = {
     "first_own.py": "import json, second_own\nfrom foosim.common import units\nclass Form: pass\n",
@@ -43,7 +43,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def forget() -> None:
     for module in [name for name in sys.modules if name.partition(".")[0].endswith("_own")]:
         del sys.modules[module]
-    used_forms._version.cache_clear()
+    versions._version.cache_clear()
     invalidate_caches()
 
 
@@ -80,5 +80,5 @@ def test_what_is_compiled_counts_with_its_bytes(folder: Path) -> None:
 
 def test_in_a_library_only_the_same_package_counts(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """There all packages lie beside each other."""
-    monkeypatch.setattr(used_forms, "in_library", lambda file: True)
+    monkeypatch.setattr(versions, "in_library", lambda file: True)
     assert list(sources_of(made("first_own", "Form"))) == ["first_own"]

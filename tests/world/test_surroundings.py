@@ -12,10 +12,10 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.table.settings import table_of
 from foosim.node.edited_frame import edit
 from foosim.world.assembly.world import initial_numbers
+from foosim.world.component_types.descriptions import ENTITY, NO_ENTITY
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import View
 from foosim.world.edits import Remove
-from foosim.world.forms.forms import ENTITY, NO_ENTITY
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout, build_layout
 from tests.placing import added_ball

@@ -20,17 +20,17 @@ from foosim.simulation.run import rehearse
 from foosim.simulation.settings import Settings
 from tests.conftest import Typed
 from tests.forms.worlds import HALL, ROVERS, World
-from tests.own_forms import folder_on_path
+from tests.own_components import folder_on_path
 
 NAME: Final = "own.yaml"
 GOOD: Final = """
 from msgspec import Struct
 from foosim import Player
 from foosim.world.components.entities import RuleMounting
-from foosim.world.forms.quantities import Metres
+from foosim.world.component_types.quantities import Metres
 from foosim.world.components.base import Actuator, EntityRule, Model, Modifier, Motion, Rule, Sensor, need, slot
-from foosim.world.forms.registry import actuator, model, modifier, rule, scene, sensor
-from foosim.world.forms.settings import (
+from foosim.world.component_types.registry import actuator, model, modifier, rule, scene, sensor
+from foosim.world.component_types.settings import (
     ActuatorSettings, EntityRuleSettings, ModifierSettings, RobotSettings, RuleSettings, SceneSettings, SensorSettings)
 from foosim.world.scene import Body, Box, Link, Shape
 

@@ -15,8 +15,8 @@ import pytest
 from foosim.world.bodies.inertia import MassOf, combined, turned
 from foosim.world.bodies.urdf import Robot, body_of, meshes_of, read_urdf, start_of
 from foosim.world.bodies.xml_tree import BYTES_MAX, DEPTH_MAX, ELEMENTS_MAX
-from foosim.world.forms.forms import BODY, Model
-from foosim.world.forms.settings import RobotSettings
+from foosim.world.component_types.descriptions import BODY, Model
+from foosim.world.component_types.settings import RobotSettings
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity
 from foosim.world.matter.mesh import AssetError

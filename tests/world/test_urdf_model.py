@@ -16,9 +16,9 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol.asset_transfer import Fetching
 from foosim.world.assembly.body_limits import BodyLimits
 from foosim.world.assembly.world import build_scene, initial_numbers
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS
 from foosim.world.edits import Push, fitting_edits
-from foosim.world.forms import registry
-from foosim.world.forms.forms import BODY, CONTACTS, JOINTS
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.matter.mesh import AssetError, digest_of

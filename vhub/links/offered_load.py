@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from foosim.deployment.network.link_settings import Profile, Profiles
 from foosim.deployment.schema import Deployment
-from foosim.world.forms.per_field import payload_bytes
+from foosim.world.component_types.per_field import payload_bytes
 
 Key = tuple[str, str]
 """Settings that links share: the rule and the radio."""

@@ -15,7 +15,7 @@ from foosim.vhub.recording.model_hash import MODEL_HASH, model_hash
 from foosim.vhub.recording.rows_of_closing import plan_of, tick_of
 from foosim.vhub.state.records import Closing
 from foosim.vhub.state.resume import Captured
-from foosim.world.assembly.used_forms import foreign_versions
+from foosim.world.assembly.versions import foreign_versions
 
 
 class Recorder(CaptureWriter):

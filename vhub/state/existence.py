@@ -12,7 +12,7 @@ import numpy as np
 
 from foosim.deployment.schema import Deployment, Player
 from foosim.vhub.state.members import Member
-from foosim.world.forms.forms import ABSENT
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.frame import Frame
 from foosim.world.layout import Layout
 

@@ -10,10 +10,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from foosim.common.keyed_random import draw_key
+from foosim.world.component_types.descriptions import NO_ENTITY
 from foosim.world.components.grasping import GripperSettings
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.view import Mounting
-from foosim.world.forms.forms import NO_ENTITY
 from foosim.world.layout import Entity, Layout
 from foosim.world.scene import Body, Shape, Sphere, Vector
 from foosim.world.spec import WorldSpec

@@ -9,7 +9,7 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.forms.forms import ABSENT
+from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.layout import Layout
 
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from foosim.world.component_types.descriptions import POSE, STILL_POSE, STILL_TICKS
 from foosim.world.components.drives import Drives
 from foosim.world.edits import Edit, Remove, Set
-from foosim.world.forms.forms import POSE, STILL_POSE, STILL_TICKS
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.scene import conjugate, multiply

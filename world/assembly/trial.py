@@ -23,12 +23,12 @@ from foosim.world.assembly.world import (
     world_status,
     world_texts,
 )
+from foosim.world.component_types.failures import failure_of
 from foosim.world.components.fitted import BoundActuator, BoundSensor, sensors_of
 from foosim.world.components.sensing import Sensing
 from foosim.world.components.view import ComponentError, SensingView, View, WritableView, called
 from foosim.world.components.watching import ReadOnly
 from foosim.world.fixed_scenery import scene_shapes
-from foosim.world.forms.failures import failure_of
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Layout, build_layout
 from foosim.world.scenery import SceneryMesh

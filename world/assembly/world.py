@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from foosim.common.keyed_random import draw_key
 from foosim.world.assembly.event_times import events_by_tick
+from foosim.world.component_types.descriptions import NO_ENTITY, overrides
+from foosim.world.component_types.failures import ContractError, failure_of
 from foosim.world.components.base import EntityRule, Model, Motion, Rule
 from foosim.world.components.drives import FREE, NO_DRIVES, Drives, Motor, Wrench, added
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting, mounting_of
@@ -28,8 +30,6 @@ from foosim.world.components.view import (
 from foosim.world.components.watching import guarded, guarded_actuator
 from foosim.world.edits import parked
 from foosim.world.fixed_scenery import fixed_shapes, kits_of
-from foosim.world.forms.failures import ContractError, failure_of
-from foosim.world.forms.forms import NO_ENTITY, overrides
 from foosim.world.frame import Frame
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.scene import Body, Scene

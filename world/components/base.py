@@ -1,8 +1,9 @@
 """The base classes of components: what foosim calls of each, as hooks that are empty by default.
 
-A component derives from the class of its type, is registered by the decorator of that name (`world/forms/registry.py`)
-and overrides what it needs. It gets its settings and its mounting, and is a pure function of the frame, its settings
-and keyed draws: its state is in slots, and its object keeps only what follows from deployment and layout.
+A component derives from the class of its type, is registered by the decorator of that name
+(`world/component_types/registry.py`) and overrides what it needs. It gets its settings and its mounting, and is a pure
+function of the frame, its settings and keyed draws: its state is in slots, which its class declares, and its object
+keeps only what follows from deployment and layout.
 """
 
 from __future__ import annotations
@@ -10,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
-from foosim.world.forms.jobs import JobState
+from foosim.world.component_types.jobs import JobState
 
 if TYPE_CHECKING:
     from foosim.common.finding import Finding
+    from foosim.world.component_types.descriptions import Size
     from foosim.world.components.entities import Marked, MarkKind, Motors
     from foosim.world.components.reach import Reach
     from foosim.world.components.view import Slot, View, WritableView
-    from foosim.world.forms.forms import Size
     from foosim.world.frame import Frame
     from foosim.world.layout import Entity, Layout
     from foosim.world.matter.physics import Physics
@@ -75,7 +76,7 @@ class Component:
     def check(settings: Any, at: Any) -> None:
         """Raise IncompatibleComponent where the settings do not fit the robot or the world; `at` is the mounting.
 
-        A modifier gets its numbers in place of a mounting (`forms.per_field.Numbers`), and raises
+        A modifier gets its numbers in place of a mounting (`per_field.Numbers`), and raises
         BadValue.
         """
 

@@ -9,10 +9,10 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import msgspec
 
+from foosim.world.component_types.descriptions import overrides
+from foosim.world.component_types.failures import ContractError
+from foosim.world.component_types.payloads import Field, PayloadCodec, field_at
 from foosim.world.components.base import Actuator
-from foosim.world.forms.failures import ContractError
-from foosim.world.forms.forms import overrides
-from foosim.world.forms.payloads import Field, PayloadCodec, field_at
 
 Bound: TypeAlias = tuple[float, float]
 NO_LIMITS: Final[Mapping[str, Bound]] = {}

@@ -9,6 +9,11 @@ from typing import Any, NamedTuple
 
 from foosim.common.errors import Malformed
 from foosim.common.keyed_random import draw_key
+from foosim.world.component_types.descriptions import SAMPLES, Component, overrides
+from foosim.world.component_types.failures import ContractError
+from foosim.world.component_types.payloads import FLOAT, PayloadCodec, as_floats
+from foosim.world.component_types.per_field import codec_of, numbers_of
+from foosim.world.component_types.settings import ActuatorSettings, ComponentSettings, SensorSettings
 from foosim.world.components.base import Actuator, Modifier, Sensor
 from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
 from foosim.world.components.job_book import JobBook
@@ -21,11 +26,6 @@ from foosim.world.components.view import (
     called,
     component_error,
 )
-from foosim.world.forms.failures import ContractError
-from foosim.world.forms.forms import SAMPLES, Component, overrides
-from foosim.world.forms.payloads import FLOAT, PayloadCodec, as_floats
-from foosim.world.forms.per_field import codec_of, numbers_of
-from foosim.world.forms.settings import ActuatorSettings, ComponentSettings, SensorSettings
 from foosim.world.layout import Entity, Layout, modifier_labels, trigger_slot
 from foosim.world.spec import WorldSpec
 

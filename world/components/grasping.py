@@ -9,8 +9,8 @@ from typing import Annotated, NamedTuple
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
+from foosim.world.component_types.settings import ActuatorSettings, Tag
 from foosim.world.components.entities import mounting_of
-from foosim.world.forms.settings import ActuatorSettings, Tag
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout
 from foosim.world.placing import FIRST_LINK, MountedAt

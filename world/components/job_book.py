@@ -1,4 +1,4 @@
-"""The state of an actuator's jobs, and the effect of each command on it: see `forms.jobs`."""
+"""The state of an actuator's jobs, and the effect of each command on it: see `jobs`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import msgspec
 
+from foosim.world.component_types.failures import ContractError
+from foosim.world.component_types.jobs import CHANGED, JOB, NUMBER_MAX, NUMBERS, RUNNING, STATES, JobState
 from foosim.world.components.base import Actuator
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.forms.failures import ContractError
-from foosim.world.forms.jobs import CHANGED, JOB, NUMBER_MAX, NUMBERS, RUNNING, STATES, JobState
 
 NO_JOB: Final = 0.0
 FRESH: Final = 2.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from msgspec import Struct
 
 from foosim.common.spec_base import Name
-from foosim.world.forms.quantities import Count
-from foosim.world.forms.settings import SensorSettings
+from foosim.world.component_types.quantities import Count
+from foosim.world.component_types.settings import SensorSettings
 
 
 class JobSettings(SensorSettings):

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue, NotFinite
+from foosim.world.component_types.failures import ContractError
+from foosim.world.component_types.payloads import as_floats
 from foosim.world.components.fitted import BoundSensor
 from foosim.world.components.view import SensingView, called, component_error, has_together, some_together
-from foosim.world.forms.failures import ContractError
-from foosim.world.forms.payloads import as_floats
 
 Numbers: TypeAlias = NDArray[np.float64]
 MODIFIED_TOGETHER_MIN: Final = 64

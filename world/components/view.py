@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from foosim.common.errors import BadValue, Failed
 from foosim.common.finding import Location
-from foosim.world.forms.failures import failure_of
-from foosim.world.forms.per_field import Numbers, read_per_field
+from foosim.world.component_types.failures import failure_of
+from foosim.world.component_types.per_field import Numbers, read_per_field
 from foosim.world.layout import WORLD, Entity, Layout
 from foosim.world.spec import WorldSpec
 

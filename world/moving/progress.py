@@ -6,9 +6,9 @@ from typing import Annotated, Final
 
 from foosim.common import units
 from foosim.common.units import Quantity
+from foosim.world.component_types.jobs import JobState
 from foosim.world.components.base import Actuator, slot
 from foosim.world.components.view import WritableView
-from foosim.world.forms.jobs import JobState
 
 Patience = Annotated[int, Quantity(units.TIME, "0.1 s", "1 h")]
 STEP_M: Final = 0.01

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Any
 
+from foosim.world.component_types.descriptions import overrides
+from foosim.world.component_types.settings import EntitySettings
 from foosim.world.components.entities import mounting_of
-from foosim.world.forms.forms import overrides
-from foosim.world.forms.settings import EntitySettings
 from foosim.world.layout import Entity, Layout
 from foosim.world.scene import Body, Capsule, Cylinder, Sphere, shape_box
 from foosim.world.spec import WorldSpec

@@ -9,7 +9,7 @@ import numpy as np
 
 from foosim.world.assembly.world import models_of
 from foosim.world.clearance.overlaps import overlapped
-from foosim.world.forms.forms import overrides
+from foosim.world.component_types.descriptions import overrides
 from foosim.world.layout import Entity, Layout
 from foosim.world.moving.solids import distance, scenery_of, solid, solids
 from foosim.world.moving.upright import Upright, upright_of

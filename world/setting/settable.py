@@ -18,11 +18,11 @@ from foosim.common.errors import BadValue
 from foosim.common.names import nearest_name
 from foosim.common.units import PROBABILITY, Quantity
 from foosim.world.assembly.world import body_of, entity_rules_of, model_of, rules_of
+from foosim.world.component_types.descriptions import DOWN, INACTIVE, NO_ENTITY, overrides
+from foosim.world.component_types.failures import ContractError
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.view import WritableView, called
 from foosim.world.edits import Add, Set, write, written
-from foosim.world.forms.failures import ContractError
-from foosim.world.forms.forms import DOWN, INACTIVE, NO_ENTITY, overrides
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import (
     WORLD,

@@ -1,4 +1,4 @@
-"""Descriptions of registered forms: their settings, slots, needs and writes."""
+"""Descriptions of registered component types: their settings, slots, needs and writes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from foosim.common.errors import BadValue, show
 from foosim.common.names import NAME_RULE, is_name
 from foosim.common.units import Quantity
-from foosim.world.forms.failures import failure_of
+from foosim.world.component_types.failures import failure_of
 
 if TYPE_CHECKING:
     from msgspec import Struct
@@ -206,15 +206,15 @@ class Component(ComponentType):
     `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers of its state, by
     field, as its class declares them: they are in the frame as `NAME.FIELD`, NAME being that of the component on its
     robot. `needs` are the fields that the model of its robot must have, those that its class declares first.
-    `array_length` is the setting with the count of numbers of a reading's last
-    fields, where these have several each, or a function that returns it.
+    `array_length` is the setting with the count of numbers of a reading's last fields, where these have several each,
+    or a function that returns it.
     `moves`: an actuator commands the motors of its robot. `joints` is the setting that names their joints, in the order
     of the actuator's set-points; without such a setting, or with None, it commands all. No motor is commanded by two
-    actuators. `jobs`: its commands may be jobs (`forms.jobs`).
+    actuators. `jobs`: its commands may be jobs (`jobs`).
     `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0; or a function that returns it, maybe a slot of an actuator.
-    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `forms.shown`; empty for none.
-    `per_field` are the settings with a number for each field (`forms.per_field`), and the least that is valid of each;
+    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `shown`; empty for none.
+    `per_field` are the settings with a number for each field (`per_field`), and the least that is valid of each;
     None without a least one.
     """
 

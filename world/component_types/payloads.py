@@ -19,7 +19,7 @@ import msgspec
 from msgspec import Struct, inspect
 
 from foosim.common.errors import BadValue, Malformed, NotFinite
-from foosim.world.forms.jobs import JOB
+from foosim.world.component_types.jobs import JOB
 
 FLOAT: Final = frozenset((float,))
 PLAIN: Final = bytes(8)

@@ -1,4 +1,4 @@
-"""The registry of forms: models, sensors, rules and all other parts of a world, by form and name.
+"""The registry of component types: models, sensors, rules and all other parts of a world, by type and name.
 
 Each is in a file of its own and registers itself there, under its name in deployments. One of foosim's own is in the
 folder of its form, or in a folder of that, in a module of its name; one of another package is in a module that the
@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 from foosim.common.errors import BadValue, Refused, UnknownName
 from foosim.common.names import CLASS_PATTERN, class_path_of, nearest_name, quoted
-from foosim.world.forms.failures import failure_of, in_library
-from foosim.world.forms.forms import (
+from foosim.world.component_types.descriptions import (
     ENGINES,
     Component,
     ComponentType,
@@ -33,8 +32,9 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
-from foosim.world.forms.registration import check_form
-from foosim.world.forms.settings import ComponentSettings
+from foosim.world.component_types.failures import failure_of, in_library
+from foosim.world.component_types.registration import check_form
+from foosim.world.component_types.settings import ComponentSettings
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from msgspec import Struct
 
     from foosim.common.spec_base import SpecBase
-    from foosim.world.forms.settings import EntitySettings
+    from foosim.world.component_types.settings import EntitySettings
 
 GROUP: Final = "foosim.world"
 LIBRARY: Final = "foosim.library"
@@ -66,12 +66,12 @@ _loaded: Final[dict[str, str]] = {}
 
 
 def sensor(name: str, settings: type[ComponentSettings], reading: type[Struct], **about: Any) -> Decorator:
-    """Register a sensor: a class derived from `components.base.Sensor`; `about` are fields of `forms.Component`."""
+    """Register a sensor: a class derived from `Sensor`; `about` are fields of `descriptions.Component`."""
     return _registering(Component, "sensor", name, settings, value=reading, **about)
 
 
 def actuator(name: str, settings: type[ComponentSettings], command: type[Struct], **about: Any) -> Decorator:
-    """Register an actuator: a class derived from `components.base.Actuator`; `about` are fields of `forms.Component`.
+    """Register an actuator: a class derived from `Actuator`; `about` are fields of `descriptions.Component`.
 
     It commands motors of its robot unless `moves` is False.
     """
@@ -79,12 +79,12 @@ def actuator(name: str, settings: type[ComponentSettings], command: type[Struct]
 
 
 def modifier(name: str, settings: type[ComponentSettings], **about: Any) -> Decorator:
-    """Register a modifier: a class derived from `components.base.Modifier`; `about` are fields of `forms.Component`."""
+    """Register a modifier: a class derived from `Modifier`; `about` are fields of `descriptions.Component`."""
     return _registering(Component, "modifier", name, settings, **about)
 
 
 def model(name: str, settings: type[EntitySettings], **about: Any) -> Decorator:
-    """Register a model: a class derived from `components.base.Model`; `about` are fields of `forms.Model`.
+    """Register a model: a class derived from `Model`; `about` are fields of `descriptions.Model`.
 
     Fields that foosim itself needs come after the declared ones. `variants` are
     classes of the same module by the value of the setting `dynamics`, each with the fields that differ:
@@ -94,8 +94,8 @@ def model(name: str, settings: type[EntitySettings], **about: Any) -> Decorator:
 
 
 def rule(name: str, settings: type[ComponentSettings], **about: Any) -> Decorator:
-    """Register a rule: a class derived from `components.base.Rule`, or from `EntityRule`; `about` are fields of
-    `forms.WorldRule` or `forms.EntityRule`."""
+    """Register a rule: a class derived from `Rule`, or from `EntityRule`; `about` are fields of
+    `descriptions.WorldRule` or `descriptions.EntityRule`."""
 
     def register(made: Made) -> Made:
         is_of_entity = getattr(made, "type_name", "") == "entity_rule"
@@ -111,7 +111,7 @@ def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Dec
 
 
 def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
-    """Register a kit: a class derived from `components.base.Kit`; `about` are fields of `forms.Kit`."""
+    """Register a kit: a class derived from `Kit`; `about` are fields of `descriptions.Kit`."""
     return _registering(Kit, "kit", name, settings, **about)
 
 

@@ -17,9 +17,9 @@ from pydantic import BeforeValidator, StrictFloat, StrictInt, WithJsonSchema
 from foosim.common import units
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.units import Dimension, custom_error
-from foosim.world.forms.forms import NO_SLOTS, Component
-from foosim.world.forms.payloads import Field, PayloadCodec, field_at, many_of
-from foosim.world.forms.settings import ComponentSettings
+from foosim.world.component_types.descriptions import NO_SLOTS, Component
+from foosim.world.component_types.payloads import Field, PayloadCodec, field_at, many_of
+from foosim.world.component_types.settings import ComponentSettings
 
 Quantity: TypeAlias = str | StrictInt | StrictFloat
 DIMENSIONS: Final[Mapping[str, Dimension]] = {

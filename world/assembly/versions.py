@@ -19,10 +19,10 @@ from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any, Final
 
-from foosim.world.forms import registry
-from foosim.world.forms.failures import OURS, in_library
-from foosim.world.forms.forms import ComponentType
-from foosim.world.forms.settings import ActuatorSettings, SensorSettings
+from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ComponentType
+from foosim.world.component_types.failures import OURS, in_library
+from foosim.world.component_types.settings import ActuatorSettings, SensorSettings
 from foosim.world.layout import spares_of
 from foosim.world.spec import WorldSpec
 

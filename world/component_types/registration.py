@@ -11,8 +11,8 @@ from foosim.common.errors import BadValue, Refused, show
 from foosim.common.names import NAME_RULE, is_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.forms import forms
-from foosim.world.forms.forms import (
+from foosim.world.component_types import descriptions
+from foosim.world.component_types.descriptions import (
     OF_ROBOTS,
     OF_SOLVED,
     SET_BY_FOOSIM,
@@ -21,10 +21,10 @@ from foosim.world.forms.forms import (
     with_article,
     word_of,
 )
-from foosim.world.forms.jobs import JOB
-from foosim.world.forms.payloads import PayloadCodec
-from foosim.world.forms.settings import BASES
-from foosim.world.forms.shown import MESSAGES
+from foosim.world.component_types.jobs import JOB
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.component_types.settings import BASES
+from foosim.world.component_types.shown import MESSAGES
 
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
 """The noun of a component's values."""
@@ -118,12 +118,12 @@ def _values(found: Any) -> Iterator[str]:
 def _slots(found: Any, key: str, slots: Any) -> Iterator[str]:
     if callable(slots) and found.type_name == "model":
         return
-    if key == "slots" and isinstance(found, forms.Component):
+    if key == "slots" and isinstance(found, descriptions.Component):
         slots = {name: 1 if callable(size) else size for name, size in slots.items()}
     problem = slots_problem(slots, is_sensor=found.type_name == "sensor")
     if problem:
         yield f"{key}: {problem}"
-    for slot in (*OF_ROBOTS, *OF_SOLVED) if isinstance(found, forms.Model) else ():
+    for slot in (*OF_ROBOTS, *OF_SOLVED) if isinstance(found, descriptions.Model) else ():
         if slots.get(slot, 1) != 1:
             yield f"{slot}, which foosim writes, is one number, not {show(slots[slot])}"
 
@@ -148,7 +148,7 @@ def _settable(found: Any) -> Iterator[str]:
     for name, quantity in getattr(found, "settable", {}).items():
         if not isinstance(quantity, Quantity):
             yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
-        elif isinstance(found, forms.Model) and name in SET_BY_FOOSIM:
+        elif isinstance(found, descriptions.Model) and name in SET_BY_FOOSIM:
             yield f"settable: {name} is set by foosim itself"
         elif not overrides(found.factory, "set") and not callable(found.slots) and found.slots.get(name) != 1:
             yield f"settable: {name} is no slot of one number, and the class has no method set"

@@ -13,7 +13,7 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
-from foosim.world.forms import registry
+from foosim.world.component_types import registry
 
 TABLE: Final = Path(__file__).parents[1] / "deploy" / "table.yaml"
 HEAD: Final = """
@@ -26,10 +26,10 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
-from foosim.world.forms.forms import ENTITY, ROBOTS
-from foosim.world.forms.quantities import Metres
-from foosim.world.forms.registry import *
-from foosim.world.forms.settings import *
+from foosim.world.component_types.descriptions import ENTITY, ROBOTS
+from foosim.world.component_types.quantities import Metres
+from foosim.world.component_types.registry import *
+from foosim.world.component_types.settings import *
 from foosim.world.components.base import *
 
 
