@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from hashlib import blake2b
+from importlib.machinery import SourceFileLoader
 from modulefinder import ModuleFinder
-from pathlib import Path
 from typing import Any, Final
 
 from foosim.world.component_types import registry
@@ -100,9 +100,9 @@ class _Imports(ModuleFinder):
     def __init__(self, module: str) -> None:
         top = sys.modules[_top(module)]
         self._module = module
-        self._folder = Path([*getattr(top, "__path__", ()), top.__file__ or ""][0]).parent
-        self._is_library = in_library(f"{self._folder}/")
-        super().__init__(path=[str(self._folder)], excludes=[OURS, *sys.stdlib_module_names])
+        folder = [*getattr(top, "__path__", ()), top.__file__ or ""][0].rpartition("/")[0]
+        self._is_library = in_library(f"{folder}/")
+        super().__init__(path=[folder], excludes=[OURS, *sys.stdlib_module_names])
         with suppress(ImportError):  # of an editable install: it is found in another way than by its folder
             self.import_hook(module)
 
@@ -116,4 +116,4 @@ class _Imports(ModuleFinder):
         """Return the files of these modules."""
         files = {name: getattr(module, "__file__", None) for name, module in self.modules.items()}
         files.setdefault(self._module, sys.modules[self._module].__file__)
-        return {name: Path(file).read_bytes() for name, file in files.items() if file}
+        return {name: SourceFileLoader(name, file).get_data(file) for name, file in files.items() if file}

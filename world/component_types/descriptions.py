@@ -205,7 +205,7 @@ class Component(ComponentType):
 
     `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers of its state, by
     field, as its class declares them: they are in the frame as `NAME.FIELD`, NAME being that of the component on its
-    robot. `needs` are the fields that the model of its robot must have, those that its class declares first.
+    robot. `needs` are the fields that the model of its robot must have: what its class declares, and others.
     `array_length` is the setting with the count of numbers of a reading's last fields, where these have several each,
     or a function that returns it.
     `moves`: an actuator commands the motors of its robot. `joints` is the setting that names their joints, in the order
