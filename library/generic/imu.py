@@ -18,8 +18,8 @@ from foosim.world.assembly.sections import gravity_of
 from foosim.world.component_types.quantities import MetresPerSecondSquared, RadiansPerSecond
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor, slot
-from foosim.world.components.mounted import Mounted
+from foosim.world.components.base import slot
+from foosim.world.components.mounted import Mounted, MountedSensor
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.scene import rotate
@@ -48,7 +48,7 @@ class Inertial(Struct, frozen=True):
 
 
 @sensor("imu", ImuSettings, Inertial)
-class Imu(Sensor):
+class Imu(MountedSensor):
     """Specific force and angular rate at the mount, in its axes.
 
     `velocity` is that of the mount at the reading before (m/s, world frame), `last_tick` the tick of that one counted
@@ -58,7 +58,7 @@ class Imu(Sensor):
     velocity, last_tick = slot(3), slot()
 
     def __init__(self, settings: ImuSettings, at: Mounting) -> None:
-        self._mount = Mounted(at, settings.at)
+        super().__init__(settings, at)
         self._gravity = gravity_of(at.spec)
         self._tick_s = at.spec.tick_ns / 1e9
 
@@ -68,7 +68,7 @@ class Imu(Sensor):
         Mounted(at, settings.at).check_twist()
 
     def sample(self, view: WritableView) -> Inertial:
-        (vx, vy, vz), angular = self._mount.twist(view.numbers)
+        (vx, vy, vz), angular = self.mount.twist(view.numbers)
         ax, ay, az = 0.0, 0.0, 0.0
         ticks = view.tick + 1.0 - view.numbers[self.last_tick.at]
         if 0.0 < ticks <= view.tick:
@@ -77,6 +77,6 @@ class Imu(Sensor):
             ax, ay, az = (vx - ux) / time_s, (vy - uy) / time_s, (vz - uz) / time_s
         view.write(self.velocity, vx, vy, vz)
         view.write(self.last_tick, view.tick + 1.0)
-        _, (x, y, z, w) = self._mount.pose(view.numbers)
+        _, (x, y, z, w) = self.mount.pose(view.numbers)
         to_mount = -x, -y, -z, w
         return Inertial(*rotate(to_mount, (ax, ay, az + self._gravity)), *rotate(to_mount, angular))

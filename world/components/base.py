@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from foosim.world.component_types.descriptions import Size
     from foosim.world.components.entities import Marked, MarkKind, Motors
     from foosim.world.components.reach import Reach
-    from foosim.world.components.view import Slot, View, WritableView
+    from foosim.world.components.view import Mounting, Slot, View, WritableView
     from foosim.world.frame import Frame
     from foosim.world.layout import Entity, Layout
     from foosim.world.matter.physics import Physics
@@ -191,6 +191,9 @@ class Model(Component):
     type_name = "model"
     is_upright: bool = True
     """Whether obstacles meet an entity that moves by kinematics as a cylinder (`upright`) instead of its shapes."""
+
+    def __init__(self, settings: Any, at: Mounting) -> None:
+        self.settings, self.at = settings, at
 
     def body(self) -> Body | None:
         """Return its links and shapes; None without a body."""
