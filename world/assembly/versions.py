@@ -1,6 +1,6 @@
-"""The forms of a world, and the versions of forms of other packages.
+"""The component types of a world, and the versions of components of other packages.
 
-Two nodes with different versions of a form would compute different worlds, and a capture is only repeated by the
+Two nodes with different versions of a component would compute different worlds, and a capture is only repeated by the
 version of its run.
 
 A version depends on a component's module, those of its base classes, and what these import of their own: modules of
@@ -30,7 +30,7 @@ DIGEST_BYTES: Final = 8
 
 
 def forms_of(spec: WorldSpec) -> list[ComponentType]:
-    """Return the forms of a world, each once, by form and name."""
+    """Return the component types of a world, each once, by type and name."""
     found = {(form.type_name, form.name): form for form in _forms_of(spec)}
     return [form for _, form in sorted(found.items())]
 
@@ -62,7 +62,7 @@ def _with_modifiers(settings: SensorSettings | ActuatorSettings) -> Iterator[Com
 
 
 def foreign_versions(spec: WorldSpec) -> dict[str, str]:
-    """Return the versions of the forms of a world that other packages bring, by form and class.
+    """Return the versions of the component types of a world that other packages bring, by type and class.
 
     A version is a digest of the sources.
     """

@@ -104,7 +104,7 @@ def overrides(kind: Callable[..., Any], hook: str) -> bool:
 
 
 def word_of(form: str) -> str:
-    """Return the noun of a form."""
+    """Return the noun of a component."""
     return WORDS.get(form, form)
 
 
@@ -151,7 +151,7 @@ files. Raises BadValue for settings without valid fields."""
 
 
 def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sensor: bool = False) -> Mapping[str, int]:
-    """Return the slots that a function of a form returns. Raises BadValue where it fails, or returns invalid slots."""
+    """Return the slots that a function returns. Raises BadValue where it fails, or returns invalid slots."""
     try:
         found = slots_of(*arguments)
     except (BadValue, KeyboardInterrupt):
@@ -172,7 +172,7 @@ ArrayLengthOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComponentType:
-    """A registered class: its form and name, the class, and the model of its settings.
+    """A registered class: its type and name, the class, and the model of its settings.
 
     `kit` is the section that a deployment must have, empty where it fits any world.
     """

@@ -3,7 +3,7 @@
 Each is in a file of its own and registers itself there, under its name in deployments. One of foosim's own is in the
 folder of its form, or in a folder of that, in a module of its name; one of another package is in a module that the
 package names as an entry point of the group `foosim.world`; and `module:Class` names one of any module on the path.
-A module is imported when one of its forms is looked up.
+A module is imported when one of its component types is looked up.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LIBRARY: Final = "foosim.library"
 """Where foosim's own are: each in a module of its name, in a folder for the kind of world."""
 FORMS: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit")
 BY_CLASS: Final = "module:Class"
-"""The notation of a form by its class, beside its name."""
+"""The notation of a component type by its class, beside its name."""
 
 Made = TypeVar("Made", bound=Callable[..., Any])
 
@@ -144,7 +144,7 @@ def _declared(form: str, made: Any, about: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _described(kind: type[Any], about: dict[str, Any]) -> Any:
-    """Return the description of a form; that of a model has the fields that foosim needs, and variants."""
+    """Return the description of a component type; that of a model has the fields that foosim needs, and variants."""
     variants = about.pop("variants", {})
     found = kind(**about)
     if not isinstance(found, Model):
@@ -160,7 +160,7 @@ def _described(kind: type[Any], about: dict[str, Any]) -> Any:
 
 
 def find(form: str, kind: str) -> ComponentType:
-    """Return the form with this `kind` in a deployment: a registered name, or `module:Class`.
+    """Return the component type with this `kind` in a deployment: a registered name, or `module:Class`.
 
     Raises UnknownName, which has the nearest name, and BadValue for a module that cannot be imported, or an
     unregistered class in it.
@@ -178,7 +178,7 @@ def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
 
 
 def lookup(form: str, kind: str) -> ComponentType | None:
-    """Return the form as `find`, or None for an unknown name; raises BadValue for a class as `find` does."""
+    """Return the component type as `find`, or None for an unknown name; raises BadValue for a class as `find` does."""
     if ":" in kind:
         return _of_class(form, kind)
     found = _known.get((form, kind)) or _own(form, kind)
@@ -278,7 +278,7 @@ def _own_modules() -> Mapping[str, str]:
 
 
 def class_at(path: str) -> Any:
-    """Return the value of `module:Class`, for a form or a player.
+    """Return the value of `module:Class`, for a component or a player.
 
     Raises BadValue for a module that cannot be imported, or has no such name; its nearest is a path that may be meant.
     """
@@ -320,7 +320,7 @@ def _not_found(path: str, missing: str) -> BadValue:
 
 
 def _of_class(form: str, path: str) -> ComponentType:
-    """Return the form that `module:Class` registered."""
+    """Return the component type that `module:Class` registered."""
     made, module = class_at(path), path.partition(":")[0]
     of_form = [one for one in _known.values() if one.type_name == form]
     for one in of_form:
@@ -332,7 +332,7 @@ def _of_class(form: str, path: str) -> ComponentType:
 
 
 def _forget_new(known: Mapping[tuple[str, str], ComponentType]) -> None:
-    """Forget the registered forms of modules whose import then failed; their earlier imports stay."""
+    """Forget the registered component types of modules whose import then failed; their earlier imports stay."""
     for key in _known.keys() - known.keys():
         if _known[key].module not in sys.modules:
             del _known[key]
