@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import AfterValidator
 
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.library.mobile.hall_bodies import DARK, mast
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
@@ -30,6 +29,8 @@ Slip = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
 
 ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
+DARK: Final[Colour] = (0.15, 0.15, 0.18, 1.0)
+MAST_RADIUS_M: Final = 0.01
 HULL: Final = DEFAULT
 """The surface of robots without rigid-body dynamics."""
 
@@ -69,6 +70,22 @@ def mark_of(vehicle: Vehicle, surface: str) -> Shape:
     radius, height = vehicle.radius, vehicle.height
     mark = Box((radius / 4, radius / 8, height / 16))
     return Shape(mark, surface, DARK, (radius / 2, 0.0, height + height / 16), radio=PLASTIC)
+
+
+def standing(
+    name: str, model: str, at: Vector, joint: Literal["free", "fixed"], shapes: tuple[Shape, ...], antenna_m: float
+) -> Body:
+    """Return a body of one link. It has no mass: no engine moves it."""
+    link = Link(name, joint, shapes, 0.0, ORIGIN)
+    return Body(name, model, at, (link,), (0.0, 0.0, antenna_m))
+
+
+def mast(bottom: float, top: float, surface: str) -> tuple[Shape, ...]:
+    """Return the mast of an antenna that is higher than the hull below it, if it is."""
+    if top <= bottom:
+        return ()
+    pole = Cylinder(MAST_RADIUS_M, top - bottom)
+    return (Shape(pole, surface, DARK, (0.0, 0.0, (top + bottom) / 2), radio=PLASTIC),)
 
 
 class KinematicModel(Model):

@@ -41,7 +41,7 @@ REFUSED: Final = {
     'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, ",
     'sensor("own", Settings, Number, shown_as="foxglove.PoseInFrame")': "its reading Number lacks the numbers that ",
     'sensor("own", Settings, Scan, shown_as="foxglove.LaserScan")': "its settings Settings lack bearings, which ",
-    'sensor("own", Settings, Number, slots={"kept": 1})': "the slots of Own are declared in its class, as offset = ",
+    'sensor("own", Settings, Number, slots={"kept": 1})': "its slots are declared in its class, as offset = ",
     'modifier("own", ModifierSettings, per_field={"std": 0.0})': "per_field names no setting, 'std' (there are: kind)",
     'rule("own", RuleSettings, settable={"a": 1.0})': "settable: a is set to a Quantity, which has limits, not to ",
     f'model("own", RobotSettings, slots={{"at": 1}}, settable={{"at": {ONE}}})': "settable: at is set by foosim itself",

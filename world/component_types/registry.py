@@ -117,7 +117,10 @@ def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
 
 def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **about: Any) -> Decorator:
     def register(made: Made) -> Made:
-        its = about | _declared(form, made, about)
+        if "slots" in about and form != "model":
+            what = "its slots are declared in its class, as offset = slot(3), not by slots="
+            raise Refused(f"{word_of(form)} {name} of {made.__module__}: {what}")
+        its = about | _declared(made, about)
         found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **its})
         check_form(found)
         key = form, name
@@ -132,15 +135,15 @@ def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **a
     return register
 
 
-def _declared(form: str, made: Any, about: Mapping[str, Any]) -> dict[str, Any]:
+def _declared(made: Any, about: Mapping[str, Any]) -> dict[str, Any]:
     """Return the slots and needs that a class declares by `slot` and `need`, as fields of its description."""
     declared = getattr(made, "declared", {}).values()
-    if "slots" in about and form != "model":
-        raise Refused(f"the slots of {made.__name__} are declared in its class, as offset = slot(3), not by slots=")
     slots = {one.name: one.size for one in declared if one.size is not None}
-    needs = (*(one.name for one in declared if one.size is None), *about.get("needs", ()))
     shared = tuple(one.name for one in declared if one.is_shared)
-    return {key: its for key, its in (("slots", slots), ("needs", needs), ("shared", shared)) if its}
+    found: dict[str, Any] = {key: its for key, its in (("slots", slots), ("shared", shared)) if its}
+    if needs := tuple(one.name for one in declared if one.size is None):
+        found["needs"] = (*needs, *about.get("needs", ()))
+    return found
 
 
 def _described(kind: type[Any], about: dict[str, Any]) -> Any:
