@@ -26,6 +26,8 @@ FILES: Final = {
     "pack_own/forms/other.py": "",
     "pack_own/common.py": "near = 1\n",
     "pack_own/unused.py": "",
+    "space_own/one.py": "from space_own import two\nclass Form: pass\n",
+    "space_own/two.py": "",
 }
 
 
@@ -67,6 +69,10 @@ def test_of_a_package_what_is_imported_counts(folder: Path) -> None:
     found = sources_of(made("pack_own.forms.one", "Form"))
     package = ["pack_own", "pack_own.common", "pack_own.forms", "pack_own.forms.one", "pack_own.forms.other"]
     assert list(found) == package
+
+
+def test_of_a_namespace_modules_count(folder: Path) -> None:
+    assert list(sources_of(made("space_own.one", "Form"))) == ["space_own.one", "space_own.two"]
 
 
 def test_what_is_compiled_counts_with_its_bytes(folder: Path) -> None:

@@ -107,7 +107,7 @@ class Places(Sensor):
     position, count = need(), slot()
 
     def __init__(self, settings, at):
-        self.place = at.slot("position")
+        self.left = at.slot("quarantined")
 
     def sample(self, view):
         view.write(self.count, view.read(self.count)[0] + 1.0)
@@ -236,7 +236,7 @@ BROKEN: Final = {
         "",
         "inf, 2.0, 0.1 for mover position: numbers of a frame",
     ),
-    "a slot that is none": ('at.slot("position")', 'at.slot("positoin")', "robots.mover.sensors:", "positoin"),
+    "a slot that is none": ('at.slot("quarantined")', 'at.slot("quarantind")', "robots.mover.sensors:", "quarantind"),
     "a reading of another type": (
         "Reading(*view",
         "tuple(view",

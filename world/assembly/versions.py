@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from hashlib import blake2b
-from importlib.machinery import SourceFileLoader
+from importlib.machinery import PathFinder, SourceFileLoader
 from modulefinder import ModuleFinder
 from typing import Any, Final
 
@@ -27,6 +27,8 @@ from foosim.world.layout import spares_of
 from foosim.world.spec import WorldSpec
 
 DIGEST_BYTES: Final = 8
+PACKAGE: Final = 5
+"""The kind of a package in `modulefinder`."""
 
 
 def forms_of(spec: WorldSpec) -> list[ComponentType]:
@@ -105,6 +107,22 @@ class _Imports(ModuleFinder):
         super().__init__(path=[folder], excludes=[OURS, *sys.stdlib_module_names])
         with suppress(ImportError):  # of an editable install: it is found in another way than by its folder
             self.import_hook(module)
+
+    def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
+        """Find a module: a namespace is a package without a file, which the base class does not know."""
+        spec = PathFinder.find_spec(name, path or self.path)
+        if spec is None or spec.loader is not None or not spec.submodule_search_locations:
+            return super().find_module(name, path, parent)
+        return None, next(iter(spec.submodule_search_locations)), ("", "", PACKAGE)
+
+    def load_package(self, fqname: str, pathname: str) -> Any:
+        """Load a package; a namespace has no file."""
+        try:
+            return super().load_package(fqname, pathname)
+        except ImportError:
+            found: Any = self.modules[fqname]
+            found.__file__ = None
+            return found
 
     def import_module(self, partname: str, fqname: str, parent: Any) -> Any:
         """Find a module of its own; None for any other."""
