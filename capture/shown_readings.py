@@ -1,4 +1,4 @@
-"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`component_types.shown`), of any other
+"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`shown`), of any other
 sensor from a plug-in as JSON.
 
 Each of them has a topic, `/readings/ROBOT/CHANNEL`. A message is the reading as the robot sent it: after modifiers,

@@ -59,7 +59,7 @@ def as_json(component: ComponentType) -> dict[str, Any]:
         "summary": component.summary,
         "class": f"{component.module}:{component.factory.__qualname__}",
         "settings": [{"key": key, "value": value, "default": default} for key, value, default in _settings(component)],
-        "slots": None if callable(slots) else {field: int(size) for field, size in slots.items()},
+        "slots": None if callable(slots) else {field: _size(size) for field, size in slots.items()},
         "needs": list(getattr(component, "needs", ())),
         "kit": component.kit,
         **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.type_name, ())},
@@ -88,9 +88,14 @@ def _settable(component: ComponentType) -> dict[str, str]:
     return its | {name: valid(one) for name, one in getattr(component, "settable", {}).items()}
 
 
+def _size(size: Any) -> int | None:
+    """Return the count of a slot's numbers; None where that follows from settings."""
+    return None if callable(size) else int(size)
+
+
 def _moved(model: Model) -> dict[str, Any]:
     """Return what moves the entities of a model, and the slots of their state."""
-    slots = None if callable(model.slots) else {field: int(size) for field, size in model.slots.items()}
+    slots = None if callable(model.slots) else {field: _size(size) for field, size in model.slots.items()}
     return {"mover": model.mover, "slots": slots}
 
 
@@ -157,8 +162,9 @@ def _paired(kinds: Mapping[str, str]) -> str:
     return ", ".join(f"{name} ({kind})" for name, kind in kinds.items())
 
 
-def _counted(slots: Mapping[str, int]) -> str:
-    return ", ".join(field if size == 1 else f"{field}[{size}]" for field, size in slots.items())
+def _counted(slots: Mapping[str, int | None]) -> str:
+    sizes = {field: "by its settings" if size is None else size for field, size in slots.items()}
+    return ", ".join(field if size == 1 else f"{field}[{size}]" for field, size in sizes.items())
 
 
 def _plain(value: Any) -> Any:

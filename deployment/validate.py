@@ -614,7 +614,7 @@ def _trigger_of_model(sensor: Component) -> str:
     """Return the field of the model that is the trigger of a sensor; empty where that is a slot of its own, or of a
     rule or an actuator (`_unheard`)."""
     trigger = sensor.trigger
-    if callable(trigger) or callable(sensor.slots) or trigger in sensor.slots or "." in trigger:
+    if callable(trigger) or trigger in sensor.slots or "." in trigger:
         return ""
     return trigger
 

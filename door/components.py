@@ -38,7 +38,7 @@ from foosim.world.component_types.settings import (
     SceneSettings,
     SensorSettings,
 )
-from foosim.world.components.base import Actuator, EntityRule, Kit, Model, Modifier, Motion, Rule, Sensor
+from foosim.world.components.base import Actuator, EntityRule, Kit, Model, Modifier, Motion, Rule, Sensor, need, slot
 from foosim.world.components.entities import Marked, MarkKind, MotionMounting, Motors, RuleMounting
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.surroundings import Surroundings
@@ -134,6 +134,7 @@ __all__ = [
     "m_s2",
     "model",
     "modifier",
+    "need",
     "rad",
     "rad_s",
     "rule",
@@ -141,6 +142,7 @@ __all__ = [
     "sensor",
     "share",
     "sin",
+    "slot",
     "units",
 ]
 

@@ -16,7 +16,6 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
-from foosim.world.assembly import versions
 from foosim.world.component_types import registry
 from tests.deployed import TABLE, TEXT
 
@@ -89,10 +88,7 @@ def folder_on_path(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def forget_modules() -> None:
     """Modules, and deployments that name theirs, are looked for anew: another one of the same name is elsewhere now."""
     loader._kept.clear()
-    for kept in (
-        *(versions._spec, versions._source, versions._imports, versions._folder),
-        *(loader._applied, registry._entry_points),
-    ):
+    for kept in (loader._applied, registry._entry_points):
         kept.cache_clear()
     invalidate_caches()
 

@@ -56,7 +56,7 @@ class Frame:
 
     def take(self, values: NDArray[np.float64]) -> None:
         """Replace the values in place: the effect of a fault in a process's memory, for tests."""
-        values.setflags(write=False)  # forms get it
+        values.setflags(write=False)  # components get it
         self._values, self._numbers, self._digest = values, None, b""
 
     @property

@@ -11,7 +11,7 @@ from math import sqrt
 from foosim.world.component_types.per_field import PerField
 from foosim.world.component_types.registry import modifier
 from foosim.world.component_types.settings import ModifierSettings
-from foosim.world.components.base import Modifier
+from foosim.world.components.base import Modifier, slot
 from foosim.world.components.view import ModifierMounting, WritableView
 
 STEP, START = 0, 1
@@ -28,14 +28,11 @@ class BiasWalkSettings(ModifierSettings):
     walk: PerField | None = None
 
 
-@modifier(
-    "bias_walk",
-    BiasWalkSettings,
-    per_field={"initial": 0.0, "walk": 0.0},
-    slots=lambda settings, about: {"offset": about.size},
-)
+@modifier("bias_walk", BiasWalkSettings, per_field={"initial": 0.0, "walk": 0.0})
 class BiasWalk(Modifier):
     """Adds an offset that walks to each number; the offset is in the frame."""
+
+    _offset = slot(lambda settings, carrier: carrier.size)
 
     def __init__(self, settings: BiasWalkSettings, at: ModifierMounting) -> None:
         from foosim.common.batched.noise import NoiseAhead, NoiseKey  # brings numpy, which readers of settings need not
@@ -43,7 +40,6 @@ class BiasWalk(Modifier):
         initial, draws = at.per_field(settings.initial, 0.0), NoiseKey(at.key).normal(0, at.numbers.size, START)
         self._start = [std * one for std, one in zip(initial, draws, strict=True)]
         self._step = [std * sqrt(at.period_s) for std in at.per_field(settings.walk, 0.0)]
-        self._offset = at.slot("offset")
         self._steps = NoiseAhead(at.key, at.numbers.size, at.period_ticks, STEP)
 
     def apply(self, values: list[float], view: WritableView) -> list[float]:

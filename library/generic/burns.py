@@ -15,7 +15,7 @@ from foosim.common.units import Quantity
 from foosim.world.component_types.descriptions import DOWN
 from foosim.world.component_types.registry import rule
 from foosim.world.component_types.settings import EntityRuleSettings
-from foosim.world.components.base import EntityRule
+from foosim.world.components.base import EntityRule, need, slot
 from foosim.world.components.entities import Marked, MarkKind
 from foosim.world.components.fires import Fires
 from foosim.world.components.mounted import Mounted
@@ -39,15 +39,16 @@ class BurnsSettings(EntityRuleSettings):
     after_ns: After = default("1 s", "after")
 
 
-@rule("burns", BurnsSettings, slots={"inside_ticks": 1, BURNT: 1}, writes=(DOWN,))
+@rule("burns", BurnsSettings, writes=(DOWN,))
 class Burns(EntityRule):
     """How long a robot has been in fires, and whether it has burnt. Put into service again, it is as new."""
 
     mark_kinds: ClassVar = {BURNT: MarkKind("lost", "robots that have burnt")}
+    inside_ticks, burnt = slot(), slot()
+    down = need()
 
     def __init__(self, settings: BurnsSettings, at: Mounting) -> None:
         self._name, self._field = at.robot.name, f"{at.name}.{BURNT}"
-        self._inside, self._burnt, self._down = at.slot("inside_ticks"), at.slot(BURNT), at.slot(DOWN)
         self._after = max(1, -(-settings.after_ns // at.spec.tick_ns))
         self._mount, self._fires = Mounted(at, settings.at), Fires(at.spec, at.layout)
 
@@ -58,20 +59,20 @@ class Burns(EntityRule):
 
     def has_power(self, view: View) -> bool:
         """Whether it has not burnt, or is in service again."""
-        return view.numbers[self._burnt.at] == 0.0 or view.numbers[self._down.at] == 0.0
+        return view.numbers[self.burnt.at] == 0.0 or view.numbers[self.down.at] == 0.0
 
     def apply(self, view: WritableView) -> None:
         """Count the ticks in fires; with the last one it burns."""
         place, _ = self._mount.pose(view.start)
         is_in = any(square <= radius * radius for radius, square in self._fires.near(place, view.start))
-        is_down = view.numbers[self._down.at] != 0.0
-        was_burnt = is_down and view.numbers[self._burnt.at] != 0.0
-        inside = view.numbers[self._inside.at] + 1.0 if is_in and not was_burnt else 0.0
+        is_down = view.numbers[self.down.at] != 0.0
+        was_burnt = is_down and view.numbers[self.burnt.at] != 0.0
+        inside = view.numbers[self.inside_ticks.at] + 1.0 if is_in and not was_burnt else 0.0
         is_burnt = was_burnt or inside >= self._after
-        view.write(self._inside, inside)
-        view.write(self._burnt, float(is_burnt))
+        view.write(self.inside_ticks, inside)
+        view.write(self.burnt, float(is_burnt))
         if is_burnt and not is_down:
-            view.write(self._down, 1.0)
+            view.write(self.down, 1.0)
 
     def marks(self, before: Frame, after: Frame) -> Iterator[Marked]:
         """Yield that it has burnt since."""

@@ -13,7 +13,7 @@ from foosim.common.units import Quantity
 from foosim.world.component_types.descriptions import Carrier
 from foosim.world.component_types.registry import modifier
 from foosim.world.component_types.settings import ModifierSettings
-from foosim.world.components.base import Modifier
+from foosim.world.components.base import Modifier, slot
 from foosim.world.components.view import ModifierMounting, WritableView
 
 Delay = Annotated[int, Quantity(units.TIME, "0 s", "10 s")]
@@ -38,24 +38,25 @@ def delay_ns(modifiers: Iterable[ModifierSettings]) -> int:
     return sum(one.time_ns for one in modifiers if isinstance(one, DelaySettings))
 
 
-def slots(settings: DelaySettings, of: Carrier) -> dict[str, int]:
-    """Return the slots: each value that may wait, and the tick at which it came. Raises BadValue for too many."""
-    younger = -(-settings.time_ns // of.period_ns)
-    if younger * of.size > NUMBERS_MAX:
-        what = f"{younger} values of {of.size} numbers wait in this time, at most {NUMBERS_MAX} numbers may"
+def value_count(settings: DelaySettings, carrier: Carrier) -> int:
+    """Return the count of values that may be in a delay. Raises BadValue for too many."""
+    younger = -(-settings.time_ns // carrier.period_ns)
+    if younger * carrier.size > NUMBERS_MAX:
+        what = f"{younger} values of {carrier.size} numbers wait in this time, at most {NUMBERS_MAX} numbers may"
         raise BadValue(what, units.format_ns(settings.time_ns))
-    return {"values": (younger + 1) * of.size, "ticks": younger + 1} if younger else {}
+    return younger + 1
 
 
-@modifier("delay", DelaySettings, slots=slots)
+@modifier("delay", DelaySettings)
 class DelayLine(Modifier):
-    """Keeps values, the oldest first, until they are old enough."""
+    """Keeps values, the oldest first, each with the tick at which it came, until they are old enough."""
+
+    _values = slot(lambda settings, carrier: value_count(settings, carrier) * carrier.size)
+    _ticks = slot(value_count)
 
     def __init__(self, settings: DelaySettings, at: ModifierMounting) -> None:
         self._ticks_old = -(-settings.time_ns // at.tick_ns)
         self._waits = settings.time_ns > 0
-        if self._waits:
-            self._values, self._ticks = at.slot("values"), at.slot("ticks")
 
     def apply(self, values: list[float], view: WritableView) -> list[float] | None:
         """Take a value; return the newest that is old enough."""

@@ -12,18 +12,18 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, sin
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.library.mobile.vehicles import HULL, Height, Speed, UprightAt, is_in_reach
+from foosim.library.mobile.vehicles import HULL, Height, KinematicModel, Speed, UprightAt
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import EntitySettings
-from foosim.world.components.base import Model, Motion
+from foosim.world.components.base import Motion
 from foosim.world.components.entities import MotionMounting, Motors
-from foosim.world.components.view import Mounting, Slot, WritableView
+from foosim.world.components.view import Slot, WritableView
 from foosim.world.layout import Entity
 from foosim.world.matter.materials import WOOD, Radio
 from foosim.world.moving.leaf import InTheWay, Leaf
 from foosim.world.placing import ORIGIN_OF_WORLD
-from foosim.world.scene import ORIGIN, Body, Box, Colour, Link, Shape, Vector, turn
+from foosim.world.scene import ORIGIN, Body, Box, Colour, Link, Shape, Vector
 
 BROWN: Final[Colour] = (0.55, 0.38, 0.22, 1.0)
 OPEN: Final = Quantity(units.PROBABILITY, "0 %", "100 %")
@@ -118,7 +118,7 @@ def _leaf(its: DoorObject, place: Sequence[float]) -> Leaf:
     units={"heading": ("rad",)},
     settable={"open": OPEN},
 )
-class Door(Model):
+class Door(KinematicModel):
     """A door that slides between shut and open, to the share `open`.
 
     `open` is the share of its way by which it is to be open, `opened` by which it is, `blocked` that something is in
@@ -128,27 +128,16 @@ class Door(Model):
     is_upright = False
     """Others meet its shape, not a cylinder."""
 
-    def __init__(self, settings: DoorObject, at: Mounting) -> None:
-        self._settings, self._at = settings, at
-        self._position = at.slot("position").at
-        self._reach_m = settings.speed * at.spec.tick_ns / 1e9
-
     def body(self) -> Body:
         """Return the leaf, above its place."""
-        its, name = self._settings, self._at.robot.name
+        its, name = self.settings, self.at.robot.name
         half = its.length / 2, its.width / 2, its.height / 2
         shape = Shape(Box(half), HULL, BROWN, (0.0, 0.0, its.height / 2), radio=its.radio)
         return Body(name, "door", ORIGIN, (Link(name, "free", (shape,), 0.0, ORIGIN),), speed_limit=its.speed)
 
     def place(self, view: WritableView) -> None:
         """Set it to where it is at the start."""
-        its, at = self._settings, self._at
-        view.write(at.slot("position"), *its.place_at(its.open))
-        view.write(at.slot("orientation"), *turn((0.0, 0.0, 1.0), its.closed.yaw))
-        view.write(at.slot("heading"), its.closed.yaw)
-        view.write(at.slot("open"), its.open)
-        view.write(at.slot("opened"), its.open)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is no farther away than it is fast."""
-        return is_in_reach(numbers, before, self._position, self._reach_m)
+        its = self.settings
+        self.set_down(view, its.place_at(its.open), its.closed.yaw)
+        view.write(self.at.slot("open"), its.open)
+        view.write(self.at.slot("opened"), its.open)

@@ -20,7 +20,7 @@ from foosim.world.component_types.settings import EntitySettings
 from foosim.world.components.base import Model, Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.fires import FIRE
-from foosim.world.components.view import Mounting, WritableView
+from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity
 from foosim.world.matter.materials import OPEN
 from foosim.world.matter.mesh import Mesh
@@ -101,12 +101,9 @@ class Fire(Model):
     It is drawn as a cone of the greatest radius that is sunk into the ground: the part above has the fire's own radius.
     """
 
-    def __init__(self, settings: FireObject, at: Mounting) -> None:
-        self._settings, self._at = settings, at
-
     def body(self) -> Body:
         """Return the cone, on a joint that sinks it (`joint_positions`: radius less the greatest one, m)."""
-        name, greatest = self._at.robot.name, self._settings.radius_max
+        name, greatest = self.at.robot.name, self.settings.radius_max
         shape = Shape(Hull(_cone(greatest)), "", FLAME, radio=OPEN)
         place = Link(name, "free", (), 0.0, ORIGIN)
         flame = Link(
@@ -116,13 +113,13 @@ class Fire(Model):
 
     def place(self, view: WritableView) -> None:
         """Light it at the place of its settings."""
-        its = self._settings
-        view.write(self._at.slot("position"), *its.at.position)
-        view.write(self._at.slot("orientation"), *UPRIGHT)
+        its = self.settings
+        view.write(self.at.slot("position"), *its.at.position)
+        view.write(self.at.slot("orientation"), *UPRIGHT)
         for slot, numbers in self.set("radius", its.radius).items():
-            view.write(self._at.slot(slot), *numbers)
+            view.write(self.at.slot(slot), *numbers)
 
     def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
         """Return the radius, no greater than it can be, and how deep that sinks the cone."""
-        greatest = self._settings.radius_max
+        greatest = self.settings.radius_max
         return {field: [min(value, greatest)], "joint_positions": [min(value, greatest) - greatest]}

@@ -10,8 +10,7 @@ from msgspec import Struct
 from foosim.world.component_types.quantities import Degrees, Metres
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.mounted import Mounted
+from foosim.world.components.mounted import MountedSensor
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.earth import Geodesy
 from foosim.world.placing import FIRST_LINK, MountedAt
@@ -39,11 +38,11 @@ class GlobalPosition(Struct, frozen=True):
 
 
 @sensor("gps", GpsSettings, GlobalPosition, shown_as="foxglove.LocationFix")
-class Gps(Sensor):
+class Gps(MountedSensor):
     """Latitude, longitude and altitude of the mount."""
 
     def __init__(self, settings: GpsSettings, at: Mounting) -> None:
-        self._mount = Mounted(at, settings.at)
+        super().__init__(settings, at)
         assert at.spec.origin is not None, "checked with the deployment"
         self._geodesy = Geodesy(at.spec.origin)
 
@@ -54,9 +53,9 @@ class Gps(Sensor):
         if at.spec.origin is None:
             what = "in a world that is nowhere on Earth: the deployment needs origin: {latitude: ..., longitude: ...}"
             raise IncompatibleComponent(("kind",), what, settings.kind)
-        Mounted(at, settings.at)
+        MountedSensor.check(settings, at)
 
     def sample(self, view: View) -> GlobalPosition:
-        position, _ = self._mount.pose(view.numbers)
+        position, _ = self.mount.pose(view.numbers)
         latitude, longitude, altitude = self._geodesy.geodetic(position)
         return GlobalPosition(latitude * DEGREES, longitude * DEGREES, altitude)

@@ -18,8 +18,8 @@ from foosim.world.assembly.sections import gravity_of
 from foosim.world.component_types.quantities import MetresPerSecondSquared, RadiansPerSecond
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.mounted import Mounted
+from foosim.world.components.base import slot
+from foosim.world.components.mounted import Mounted, MountedSensor
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.scene import rotate
@@ -47,18 +47,19 @@ class Inertial(Struct, frozen=True):
     groups: ClassVar = {"specific_force": ("fx", "fy", "fz"), "angular_rate": ("wx", "wy", "wz")}
 
 
-@sensor("imu", ImuSettings, Inertial, slots={"velocity": 3, "measured": 1})
-class Imu(Sensor):
+@sensor("imu", ImuSettings, Inertial)
+class Imu(MountedSensor):
     """Specific force and angular rate at the mount, in its axes.
 
-    `velocity` is that of the mount at the reading before (m/s, world frame), `measured` the tick of that one counted
+    `velocity` is that of the mount at the reading before (m/s, world frame), `last_tick` the tick of that one counted
     from 1, 0 before the first.
     """
 
+    velocity, last_tick = slot(3), slot()
+
     def __init__(self, settings: ImuSettings, at: Mounting) -> None:
-        self._mount = Mounted(at, settings.at)
+        super().__init__(settings, at)
         self._gravity = gravity_of(at.spec)
-        self._velocity, self._measured = at.slot("velocity"), at.slot("measured")
         self._tick_s = at.spec.tick_ns / 1e9
 
     @staticmethod
@@ -67,15 +68,15 @@ class Imu(Sensor):
         Mounted(at, settings.at).check_twist()
 
     def sample(self, view: WritableView) -> Inertial:
-        (vx, vy, vz), angular = self._mount.twist(view.numbers)
+        (vx, vy, vz), angular = self.mount.twist(view.numbers)
         ax, ay, az = 0.0, 0.0, 0.0
-        ticks = view.tick + 1.0 - view.numbers[self._measured.at]
+        ticks = view.tick + 1.0 - view.numbers[self.last_tick.at]
         if 0.0 < ticks <= view.tick:
             time_s = ticks * self._tick_s
-            ux, uy, uz = view.read(self._velocity)
+            ux, uy, uz = view.read(self.velocity)
             ax, ay, az = (vx - ux) / time_s, (vy - uy) / time_s, (vz - uz) / time_s
-        view.write(self._velocity, vx, vy, vz)
-        view.write(self._measured, view.tick + 1.0)
-        _, (x, y, z, w) = self._mount.pose(view.numbers)
+        view.write(self.velocity, vx, vy, vz)
+        view.write(self.last_tick, view.tick + 1.0)
+        _, (x, y, z, w) = self.mount.pose(view.numbers)
         to_mount = -x, -y, -z, w
         return Inertial(*rotate(to_mount, (ax, ay, az + self._gravity)), *rotate(to_mount, angular))

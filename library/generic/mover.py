@@ -16,11 +16,11 @@ from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
 from foosim.library.generic.path import Path, Point, path_at_speed, path_of
 from foosim.library.mobile.arcs import Floats, shorter, upright_turn
-from foosim.library.mobile.vehicles import HULL, Height, Radius, Speed, is_in_reach
+from foosim.library.mobile.vehicles import HULL, Height, KinematicModel, Radius, Speed
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
-from foosim.world.components.base import Model, Motion
+from foosim.world.components.base import Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.layout import Entity
@@ -29,7 +29,7 @@ from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
 from foosim.world.placing import Coordinate, Turn
-from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, Sphere, turn
+from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, Sphere
 
 YELLOW: Final[Colour] = (0.95, 0.80, 0.10, 1.0)
 FASTEST: Final = 50.0
@@ -201,18 +201,21 @@ class Track(Motion):
     motion=Track,
     units={"heading": ("rad",)},
 )
-class Mover(Model):
+class Mover(KinematicModel):
     """A box, a cylinder or a sphere that moves along a path; `blocked`: an obstacle stopped it in the tick."""
 
     def __init__(self, settings: MoverRobot, at: Mounting) -> None:
-        self._settings, self._at = settings, at
         self._path = settings.as_path()
-        self._position = at.slot("position").at
-        self._reach_m = self._path.fastest * at.spec.tick_ns / 1e9
+        super().__init__(settings, at)
+
+    @property
+    def fastest(self) -> float:
+        """The greatest speed of its path (m/s)."""
+        return self._path.fastest
 
     def body(self) -> Body:
         """Return the shape, above its place."""
-        its, name = self._settings, self._at.robot.name
+        its, name = self.settings, self.at.robot.name
         length, width, height = its.size()
         geometry: Box | Cylinder | Sphere = Box((length / 2, width / 2, height / 2))
         if its.shape == "cylinder":
@@ -225,17 +228,11 @@ class Mover(Model):
 
     def upright(self) -> Upright:
         """Return its cylinder for obstacles, in which it can have any heading."""
-        length, width, height = self._settings.size()
-        radius = length / 2 if self._settings.shape != "box" else sqrt(length * length + width * width) / 2
+        length, width, height = self.settings.size()
+        radius = length / 2 if self.settings.shape != "box" else sqrt(length * length + width * width) / 2
         return Upright(radius, 0.0, height)
 
     def place(self, view: WritableView) -> None:
         """Set it to where its path begins."""
         x, y, z, yaw = self._path.at(0.0)
-        view.write(self._at.slot("position"), x, y, z)
-        view.write(self._at.slot("orientation"), *turn((0.0, 0.0, 1.0), yaw))
-        view.write(self._at.slot("heading"), yaw)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is no farther away than its path is fast."""
-        return is_in_reach(numbers, before, self._position, self._reach_m)
+        self.set_down(view, (x, y, z), yaw)

@@ -10,8 +10,8 @@ from msgspec import Struct
 from foosim.world.component_types.quantities import Metres, Radians
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.view import Mounting, SlotReadings, View
+from foosim.world.components.base import Sensor, need
+from foosim.world.components.view import SlotReadings, View
 
 
 class PoseSettings(SensorSettings):
@@ -28,18 +28,17 @@ class Pose(Struct, frozen=True):
     groups: ClassVar = {"position": ("x", "y")}
 
 
-@sensor("pose", PoseSettings, Pose, needs=("position", "heading"), shown_as="foxglove.PoseInFrame")
+@sensor("pose", PoseSettings, Pose, shown_as="foxglove.PoseInFrame")
 class PoseTracker(Sensor):
     """Place and heading in the world frame."""
 
-    def __init__(self, settings: PoseSettings, at: Mounting) -> None:
-        self._position, self._heading = at.slot("position"), at.slot("heading")
+    position, heading = need(), need()
 
     def sample(self, view: View) -> Pose:
-        x, y, _ = view.read(self._position)
-        return Pose(x, y, view.numbers[self._heading.at])
+        x, y, _ = view.read(self.position)
+        return Pose(x, y, view.numbers[self.heading.at])
 
     @staticmethod
     def together(sensors: Sequence[PoseTracker]) -> SlotReadings:
         """Return these as one."""
-        return SlotReadings([(one._position.at, one._position.at + 1, one._heading.at) for one in sensors])
+        return SlotReadings([(one.position.at, one.position.at + 1, one.heading.at) for one in sensors])

@@ -9,9 +9,8 @@ from msgspec import Struct
 from foosim.world.component_types.quantities import Metres, QuaternionPart
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.mounted import Mounted
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.mounted import MountedSensor
+from foosim.world.components.view import View
 from foosim.world.placing import FIRST_LINK, MountedAt
 
 
@@ -36,17 +35,9 @@ class Pose3d(Struct, frozen=True):
 
 
 @sensor("pose_3d", Pose3dSettings, Pose3d, shown_as="foxglove.PoseInFrame")
-class PoseTracker3d(Sensor):
+class PoseTracker3d(MountedSensor):
     """Position and orientation of the mount in the world frame."""
 
-    def __init__(self, settings: Pose3dSettings, at: Mounting) -> None:
-        self._mount = Mounted(at, settings.at)
-
-    @staticmethod
-    def check(settings: Pose3dSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a link that the robot does not have."""
-        Mounted(at, settings.at)
-
     def sample(self, view: View) -> Pose3d:
-        position, orientation = self._mount.pose(view.numbers)
+        position, orientation = self.mount.pose(view.numbers)
         return Pose3d(*position, *orientation)

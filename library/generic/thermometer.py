@@ -18,9 +18,8 @@ from foosim.common.units import Quantity
 from foosim.world.component_types.quantities import DegreesCelsius
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
 from foosim.world.components.fires import Fires
-from foosim.world.components.mounted import Mounted
+from foosim.world.components.mounted import MountedSensor
 from foosim.world.components.view import Mounting, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 
@@ -46,20 +45,16 @@ class Temperature(Struct, frozen=True):
 
 
 @sensor("thermometer", ThermometerSettings, Temperature)
-class Thermometer(Sensor):
+class Thermometer(MountedSensor):
     """The temperature at the mount, by the distance from all fires that burn."""
 
     def __init__(self, settings: ThermometerSettings, at: Mounting) -> None:
-        self._mount, self._fires = Mounted(at, settings.at), Fires(at.spec, at.layout)
+        super().__init__(settings, at)
+        self._fires = Fires(at.spec, at.layout)
         self._ambient, self._gain = settings.ambient, settings.gain
 
-    @staticmethod
-    def check(settings: ThermometerSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a link that the robot does not have."""
-        Mounted(at, settings.at)
-
     def sample(self, view: View) -> Temperature:
-        place, _ = self._mount.pose(view.numbers)
+        place, _ = self.mount.pose(view.numbers)
         temperature = self._ambient
         for radius, square in self._fires.near(place, view.start):
             least = radius * radius

@@ -9,8 +9,7 @@ from msgspec import Meta, Struct
 from foosim.world.component_types.quantities import MetresPerSecond
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.mounted import Mounted
+from foosim.world.components.mounted import MountedSensor
 from foosim.world.components.view import Mounting, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.scene import rotate
@@ -39,18 +38,17 @@ class Velocity(Struct, frozen=True):
 
 
 @sensor("velocity", VelocitySettings, Velocity, needs=("position", "orientation", "linear_velocity"))
-class VelocitySensor(Sensor):
+class VelocitySensor(MountedSensor):
     """Velocity and turn rate of the mount over the ground, with the slip of the wheels."""
 
     def __init__(self, settings: VelocitySettings, at: Mounting) -> None:
-        """Raises BadValue for a link that the robot does not have."""
-        self._mounted = Mounted(at, settings.at)
+        super().__init__(settings, at)
         self._is_own = settings.frame == "own"
 
     def sample(self, view: View) -> Velocity:
-        linear, angular = self._mounted.twist(view.numbers)
+        linear, angular = self.mount.twist(view.numbers)
         if self._is_own:
-            _, (x, y, z, w) = self._mounted.pose(view.numbers)
+            _, (x, y, z, w) = self.mount.pose(view.numbers)
             back = (-x, -y, -z, w)
             linear, angular = rotate(back, linear), rotate(back, angular)
         return Velocity(*linear, *angular)

@@ -11,23 +11,24 @@ from __future__ import annotations
 
 from foosim.world.air import AIR_SPEED, AXES, WindSettings
 from foosim.world.component_types.registry import rule
-from foosim.world.components.base import Rule
+from foosim.world.components.base import Rule, slot
 from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import WritableView
 
 
-@rule("wind", WindSettings, slots=dict.fromkeys(AXES, 1), settable=dict.fromkeys(AXES, AIR_SPEED))
+@rule("wind", WindSettings, settable=dict.fromkeys(AXES, AIR_SPEED))
 class Wind(Rule):
     """The velocity of the air (m/s), the same everywhere."""
 
+    x, y, z = slot(), slot(), slot()
+
     def __init__(self, settings: WindSettings, at: RuleMounting) -> None:
         self._start = {axis: getattr(settings, axis) for axis in AXES}
-        self._at = at
 
     def place(self, view: WritableView) -> None:
         """Set it to its value at tick 0."""
         for axis, speed in self._start.items():
-            view.write(self._at.slot(axis), speed)
+            view.write(getattr(self, axis), speed)
 
     def apply(self, view: WritableView) -> None:
         """It stays as it is."""

@@ -14,7 +14,7 @@ from foosim.common.units import Quantity, custom_error
 from foosim.library.mobile.vehicles import UprightAt
 from foosim.world.component_types.registry import rule
 from foosim.world.component_types.settings import RuleSettings, Tag
-from foosim.world.components.base import Rule
+from foosim.world.components.base import Rule, slot
 from foosim.world.components.entities import Marked, MarkKind, RuleMounting
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import View, WritableView
@@ -53,18 +53,18 @@ class ZoneSettings(RuleSettings):
         return self
 
 
-@rule("zone", ZoneSettings, slots={"count": 1, "all_in": 1, "since": 1})
+@rule("zone", ZoneSettings)
 class Zone(Rule):
     """How many are in a zone (`count`), and whether all of them are, which are at least one (`all_in`).
 
-    `since` is the tick from which on all were in it, for the last time.
+    `start_tick` is the tick from which on all were in it, for the last time.
     """
 
     mark_kinds: ClassVar = {FULL: MarkKind("score", "zones with all in them")}
+    count, all_in, start_tick = slot(), slot(), slot()
 
     def __init__(self, settings: ZoneSettings, at: RuleMounting) -> None:
         self._name = at.name
-        self._count, self._all_in, self._since = at.slot("count"), at.slot("all_in"), at.slot("since")
         self._tick_s = at.spec.tick_ns / 1e9
         self._around = Surroundings(at.spec, at.layout)
         self._entities = self._around.tagged(settings.tag)
@@ -77,11 +77,11 @@ class Zone(Rule):
         """Count."""
         places = list(self._places(view))
         inside = sum(self._has(place[0], place[1]) for place in places)
-        view.write(self._count, float(inside))
+        view.write(self.count, float(inside))
         is_all = 0 < inside == len(places)
-        if is_all and view.numbers[self._all_in.at] == 0.0:
-            view.write(self._since, float(view.tick))
-        view.write(self._all_in, float(is_all))
+        if is_all and view.numbers[self.all_in.at] == 0.0:
+            view.write(self.start_tick, float(view.tick))
+        view.write(self.all_in, float(is_all))
 
     def _places(self, view: View) -> Iterator[tuple[float, float, float]]:
         """Yield where those are that are present."""
@@ -102,7 +102,7 @@ class Zone(Rule):
 
     def status(self, view: View) -> dict[str, Any]:
         """Return how many are in the zone and how many there are, whether all are, and since when (s, or None)."""
-        (count,), (all_in,), (since,) = view.read(self._count), view.read(self._all_in), view.read(self._since)
+        (count,), (all_in,), (since,) = view.read(self.count), view.read(self.all_in), view.read(self.start_tick)
         since_s = round(since * self._tick_s, 9) if all_in else None
         found = {"in": int(count), "of": len(list(self._places(view))), "all_in": bool(all_in), "since_s": since_s}
         return {f"zone {self._name}": found}

@@ -27,7 +27,7 @@ from foosim.library.mobile.station import StationRobot
 from foosim.world.component_types.quantities import Share, Volts
 from foosim.world.component_types.registry import rule, sensor
 from foosim.world.component_types.settings import EntityRuleSettings, SensorSettings, Tag
-from foosim.world.components.base import EntityRule, Sensor
+from foosim.world.components.base import EntityRule, Sensor, slot
 from foosim.world.components.entities import Marked, MarkKind
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
@@ -142,18 +142,19 @@ def check_battery(settings: BatteryRuleSettings, at: Mounting) -> None:
 EMPTY: Final = "empty"
 
 
-@rule("battery", BatteryRuleSettings, slots={"charge": 1}, shared=("charge",), settable={"charge": CHARGE})
+@rule("battery", BatteryRuleSettings, settable={"charge": CHARGE})
 class BatteryRule(EntityRule):
     """The charge of one robot (J)."""
 
     mark_kinds: ClassVar = {EMPTY: MarkKind("lost", "empty batteries")}
+    charge = slot(shared=True)
 
     def __init__(self, settings: BatteryRuleSettings, at: Mounting) -> None:
         self._name, self._dt = at.robot.name, at.spec.tick_ns / 1e9
         cell = cell_of(settings, at)
         self._idle, self._drag, self._capacity = cell.idle, cell.drag, cell.capacity
         self._start = settings.charge * cell.capacity
-        self._charge, self._robot = at.slot("charge"), at.robot
+        self._robot = at.robot
         self._is_rover = is_rover(at.spec, at.robot)
         self._field = f"{at.name}.charge" if f"{at.name}.charge" in at.robot.offsets else "charge"
         self._wheels = at.slot("wheel_speeds").at if self._is_rover else -1
@@ -177,7 +178,7 @@ class BatteryRule(EntityRule):
     def place(self, view: WritableView) -> None:
         """Charge it by the deployment's or the rover's own setting."""
         if not self._is_rover:
-            view.write(self._charge, self._start)
+            view.write(self.charge, self._start)
 
     def set(self, field: str, value: float) -> Mapping[str, Sequence[float]]:
         """Return the charge of a share of its capacity."""
@@ -185,11 +186,11 @@ class BatteryRule(EntityRule):
 
     def has_power(self, view: View) -> bool:
         """Whether there is any charge."""
-        return view.numbers[self._charge.at] > 0.0
+        return view.numbers[self.charge.at] > 0.0
 
     def apply(self, view: WritableView) -> None:
         """Subtract the cost of a tick, and add the energy from chargers."""
-        charge = view.numbers[self._charge.at] - self._idle * self._dt - self._drag * self._way(view)
+        charge = view.numbers[self.charge.at] - self._idle * self._dt - self._drag * self._way(view)
         chargers = [*self._standing, *self._places(view)] if self._tagged else self._standing
         if chargers:
             x, y = self._place(view)
@@ -197,7 +198,7 @@ class BatteryRule(EntityRule):
                 dx, dy = x - there_x, y - there_y
                 if dx * dx + dy * dy <= reach * reach:
                     charge += power * self._dt
-        view.write(self._charge, min(max(charge, 0.0), self._capacity))
+        view.write(self.charge, min(max(charge, 0.0), self._capacity))
 
     def _way(self, view: WritableView) -> float:
         """Return how far it has gone in the tick (m)."""

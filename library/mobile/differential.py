@@ -12,8 +12,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity, custom_error
-from foosim.library.mobile.hall_bodies import DARK, mast
-from foosim.library.mobile.vehicles import Acceleration, Slip, Speed, TurnRate, Vehicle, mark_of
+from foosim.library.mobile.vehicles import DARK, Acceleration, Slip, Speed, TurnRate, Vehicle, mark_of, mast
 from foosim.world.bodies.inertia import solid
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.matter.physics import DEFAULT, FRICTIONLESS

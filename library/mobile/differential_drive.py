@@ -11,7 +11,7 @@ from foosim.common.exact_math import atan2
 from foosim.library.mobile.arcs import Arcs, Floats, along_arcs, approached
 from foosim.library.mobile.differential import DifferentialDriveRobot, rigid_body
 from foosim.library.mobile.set_points import set_points_of
-from foosim.library.mobile.vehicles import body_of, is_in_reach, set_down, upright
+from foosim.library.mobile.vehicles import VehicleModel
 from foosim.library.mobile.wheels import WheelMotors, Wheels, slips_of, wheels_of
 from foosim.library.rigid.primitives import RIGID
 from foosim.world.component_types.descriptions import BODY, JOINTS
@@ -22,7 +22,6 @@ from foosim.world.components.view import Mounting, Slot, WritableView
 from foosim.world.layout import Entity
 from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay
-from foosim.world.moving.upright import Upright
 from foosim.world.scene import Body, Colour, moved, rotate
 
 BLUE: Final[Colour] = (0.15, 0.35, 0.75, 1.0)
@@ -154,7 +153,7 @@ class RigidDifferentialDrive(Model):
     def place(self, view: WritableView) -> None:
         """Set it to its start, on its wheels, at rest."""
         at, where = self._at, self._settings.at
-        set_down(at, where, view)
+        view.write(at.slot("heading"), where.yaw)
         centre = rotate(where.orientation, (0.0, 0.0, self._settings.centre_height))
         view.write(at.slot("position"), *moved(where.position, centre, 1.0))
         view.write(at.slot("orientation"), *where.orientation)
@@ -187,37 +186,17 @@ class RigidDifferentialDrive(Model):
         }
     },
 )
-class DifferentialDrive(Model):
+class DifferentialDrive(VehicleModel):
     """A round robot on two driven wheels.
 
     `wheel_speeds` are rim speeds, `wheel_travel` is how far the wheels have turned, `blocked` whether an obstacle
     stopped it in the tick.
     """
 
-    def __init__(self, settings: DifferentialDriveRobot, at: Mounting) -> None:
-        self._settings, self._at = settings, at
-        self._position = at.slot("position").at
-        self._reach_m = settings.speed * at.spec.tick_ns / 1e9
-
-    def body(self) -> Body:
-        """Return the hull, a mark ahead, and the antenna's mast."""
-        settings = self._settings
-        return body_of(settings, self._at.robot.name, "differential_drive", BLUE, settings.speed)
-
-    def upright(self) -> Upright:
-        """Return its cylinder for obstacles."""
-        return upright(self._settings)
+    colour: ClassVar = BLUE
 
     def wheels(self) -> Wheels:
         """Return its wheels, which slip each by a share of its own."""
-        its = self._settings
-        slips = slips_of(self._at.spec, self._at.robot.name, its.slip)
+        its = self.settings
+        slips = slips_of(self.at.spec, self.at.robot.name, its.slip)
         return Wheels(its.track, its.speed, its.acceleration, its.turn_rate, slips)
-
-    def place(self, view: WritableView) -> None:
-        """Set it to its start, at rest."""
-        set_down(self._at, self._settings.at, view)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is no farther away than its wheels can have taken it."""
-        return is_in_reach(numbers, before, self._position, self._reach_m)

@@ -14,10 +14,10 @@ from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.quantities import JobNumber, Metres
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
-from foosim.world.moving.progress import SLOTS, Patience, Progress
+from foosim.world.moving.progress import Approach, Patience
 from foosim.world.moving.upright import made_model
 from foosim.world.placing import FAR_M
 
@@ -43,22 +43,16 @@ class Place(Struct, frozen=True):
     job: JobNumber = 0.0
 
 
-@actuator(
-    "go_to",
-    GoToSettings,
-    Place,
-    slots={"given": 1, "target": 2, **SLOTS},
-    needs=("position", "heading"),
-    jobs=True,
-)
-class GoTo(Actuator):
+@actuator("go_to", GoToSettings, Place, jobs=True)
+class GoTo(Approach):
     """Keeps the place of the last command; without one the robot stands."""
+
+    has_target, target = slot(), slot(2)
+    position, heading = need(), need()
 
     def __init__(self, settings: GoToSettings, at: Mounting) -> None:
         """Raises BadValue for a model without wheels and without a way to move."""
-        self._given, self._target = at.slot("given"), at.slot("target")
-        self._position, self._heading = at.slot("position"), at.slot("heading")
-        self._tolerance, self._progress = settings.tolerance, Progress(at, settings.patience_ns)
+        self._tolerance, self.patience_ticks = settings.tolerance, settings.patience_ns // at.spec.tick_ns
         self._feelers = None if settings.feelers is None else Feelers(at, settings.feelers)
         robot = at.spec.robots[at.robot.name]
         self._drive: _Base | _OnWheels = _Base(robot) if isinstance(robot, HolonomicRobot) else _OnWheels(at)
@@ -81,10 +75,10 @@ class GoTo(Actuator):
         self._set(view, 1.0, command.x, command.y)
         return True
 
-    def _set(self, view: WritableView, given: float, x: float, y: float) -> None:
-        view.write(self._given, given)
-        view.write(self._target, x, y)
-        self._progress.begin(view)
+    def _set(self, view: WritableView, has_target: float, x: float, y: float) -> None:
+        view.write(self.has_target, has_target)
+        view.write(self.target, x, y)
+        self.begin(view)
 
     def hold(self, view: WritableView) -> None:
         """Stop it."""
@@ -92,24 +86,24 @@ class GoTo(Actuator):
 
     def excite(self, view: WritableView) -> None:
         """Go to a place ahead and aside, for the run that compares engines."""
-        x, y, _ = view.read(self._position)
+        x, y, _ = view.read(self.position)
         self._set(view, 1.0, x + 1.0, y + 0.5)
 
     def progress(self, view: WritableView) -> JobState:
         """Return whether it is there."""
         left_m = hypot(*self._way(view))
-        return self._progress.judge(view, left_m, is_there=left_m <= self._tolerance)
+        return self.judge(view, left_m, is_there=left_m <= self._tolerance)
 
     def _way(self, view: View) -> tuple[float, float]:
         """Return the way that is left (m), in the world frame."""
-        (x, y), (here_x, here_y, _) = view.read(self._target), view.read(self._position)
+        (x, y), (here_x, here_y, _) = view.read(self.target), view.read(self.position)
         return x - here_x, y - here_y
 
     def command(self, view: View) -> Motors:
         """Return the set-points of the drive's motors."""
         x, y = self._way(view)
-        left_m, heading = hypot(x, y), view.numbers[self._heading.at]
-        if view.numbers[self._given.at] == 0.0 or left_m <= self._tolerance:
+        left_m, heading = hypot(x, y), view.numbers[self.heading.at]
+        if view.numbers[self.has_target.at] == 0.0 or left_m <= self._tolerance:
             return self._drive.set_points(Steering(0.0, 0.0, 0.0), view)
         felt = NOTHING_FELT if self._feelers is None else self._feelers.felt(view, heading, left_m)
         bearing, its = shorter(atan2(y, x) - heading), self._drive

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -15,21 +15,17 @@ from foosim.library.mobile.vehicles import (
     Speed,
     TurnRate,
     Vehicle,
-    body_of,
-    is_in_reach,
-    set_down,
-    upright,
+    VehicleModel,
 )
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
-from foosim.world.components.base import Model, Motion
+from foosim.world.components.base import Motion
 from foosim.world.components.entities import MotionMounting, Motors
-from foosim.world.components.view import Mounting, WritableView
+from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity
 from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay
-from foosim.world.moving.upright import Upright
-from foosim.world.scene import Body, Colour
+from foosim.world.scene import Colour
 
 TEAL: Final[Colour] = (0.10, 0.55, 0.55, 1.0)
 
@@ -127,30 +123,11 @@ class HolonomicMotion(Motion):
     tags=("vehicle",),
     units={"heading": ("rad",), "base_velocity": ("m/s", "m/s", "rad/s")},
 )
-class Holonomic(Model):
+class Holonomic(VehicleModel):
     """A round base that moves in any direction.
 
     `base_velocity` is what its wheels do, ahead, to the left and turning left; `blocked` whether an obstacle stopped it
     in the tick.
     """
 
-    def __init__(self, settings: HolonomicRobot, at: Mounting) -> None:
-        self._settings, self._at = settings, at
-        self._position = at.slot("position").at
-        self._reach_m = settings.speed * at.spec.tick_ns / 1e9
-
-    def body(self) -> Body:
-        """Return the hull, a mark ahead, and the antenna's mast."""
-        return body_of(self._settings, self._at.robot.name, "holonomic", TEAL, self._settings.speed)
-
-    def upright(self) -> Upright:
-        """Return its cylinder for obstacles."""
-        return upright(self._settings)
-
-    def place(self, view: WritableView) -> None:
-        """Set it to its start, at rest."""
-        set_down(self._at, self._settings.at, view)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is no farther away than its speed allows."""
-        return is_in_reach(numbers, before, self._position, self._reach_m)
+    colour: ClassVar = TEAL

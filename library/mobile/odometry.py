@@ -12,8 +12,8 @@ from msgspec import Struct
 from foosim.world.component_types.quantities import Metres
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.view import Mounting, SlotReadings, View
+from foosim.world.components.base import Sensor, need
+from foosim.world.components.view import SlotReadings, View
 
 
 class OdometrySettings(SensorSettings):
@@ -27,17 +27,16 @@ class WheelTravel(Struct, frozen=True):
     right: Metres
 
 
-@sensor("odometry", OdometrySettings, WheelTravel, needs=("wheel_travel",))
+@sensor("odometry", OdometrySettings, WheelTravel)
 class Odometry(Sensor):
     """Travel of the left and the right wheel's rim since the start."""
 
-    def __init__(self, settings: OdometrySettings, at: Mounting) -> None:
-        self.travel = at.slot("wheel_travel")
+    wheel_travel = need()
 
     def sample(self, view: View) -> WheelTravel:
-        return WheelTravel(*view.read(self.travel))
+        return WheelTravel(*view.read(self.wheel_travel))
 
     @staticmethod
     def together(sensors: Sequence[Odometry]) -> SlotReadings:
         """Return these as one."""
-        return SlotReadings([one.travel.places for one in sensors])
+        return SlotReadings([one.wheel_travel.places for one in sensors])

@@ -8,7 +8,7 @@ from foosim.library.mobile.rotors import QuadrotorRobot
 from foosim.library.rigid.primitives import RIGID
 from foosim.world.component_types.registry import model
 from foosim.world.components.base import Model
-from foosim.world.components.view import Mounting, WritableView
+from foosim.world.components.view import WritableView
 from foosim.world.matter.materials import PLASTIC
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape
 
@@ -27,12 +27,9 @@ RED: Final[Colour] = (0.80, 0.20, 0.15, 1.0)
 class Quadrotor(Model):
     """A frame with four discs, x ahead, z up: a rigid body."""
 
-    def __init__(self, settings: QuadrotorRobot, at: Mounting) -> None:
-        self._settings, self._at = settings, at
-
     def body(self) -> Body:
         """Return the middle and the discs of its rotors."""
-        settings, name = self._settings, self._at.robot.name
+        settings, name = self.settings, self.at.robot.name
         side, height = settings.side, settings.height
         middle = Shape(Box((side / 2, side / 2, height / 2)), settings.surface, GREY, radio=PLASTIC)
         disc = Cylinder(settings.rotor_radius, 0.2 * height)
@@ -45,7 +42,7 @@ class Quadrotor(Model):
 
     def place(self, view: WritableView) -> None:
         """Set it to its start, at rest."""
-        at = self._at
-        view.write(at.slot("position"), *self._settings.at.position)
-        view.write(at.slot("orientation"), *self._settings.at.orientation)
+        at = self.at
+        view.write(at.slot("position"), *self.settings.at.position)
+        view.write(at.slot("orientation"), *self.settings.at.orientation)
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)

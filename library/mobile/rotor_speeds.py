@@ -15,7 +15,7 @@ from foosim.library.mobile.rotors import QuadrotorRobot
 from foosim.world.component_types.quantities import RadiansPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, slot
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.view import Mounting, View, WritableView
 
@@ -32,14 +32,15 @@ class RotorSpeeds(Struct, frozen=True):
     speeds: Speeds
 
 
-@actuator("rotor_speeds", RotorSpeedsSettings, RotorSpeeds, slots={"set_point": 4}, needs=("angular_velocity",))
+@actuator("rotor_speeds", RotorSpeedsSettings, RotorSpeeds, needs=("angular_velocity",))
 class RotorSpeedsActuator(Actuator):
     """Rotors that keep the speeds of the last command."""
+
+    _set_point = slot(4)
 
     def __init__(self, settings: RotorSpeedsSettings, at: Mounting) -> None:
         robot = at.spec.robots[at.robot.name]
         assert isinstance(robot, QuadrotorRobot), f"{at.robot.name} has no rotors"
-        self._set_point = at.slot("set_point")
         self._speed_max, self._thrust, self._drag = robot.rotor_speed, robot.thrust_factor, robot.drag_factor
         self._places = robot.rotor_places()
 

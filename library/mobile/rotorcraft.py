@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 
@@ -21,21 +21,17 @@ from foosim.library.mobile.vehicles import (
     Speed,
     TurnRate,
     Vehicle,
-    body_of,
-    is_in_reach,
-    set_down,
-    upright,
+    VehicleModel,
 )
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
-from foosim.world.components.base import Model, Motion
+from foosim.world.components.base import Motion
 from foosim.world.components.entities import MotionMounting, Motors
-from foosim.world.components.view import Mounting, WritableView
+from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity
 from foosim.world.moving.columns import EntityColumns
 from foosim.world.moving.free_way import FreeWay
-from foosim.world.moving.upright import Upright
-from foosim.world.scene import Body, Colour
+from foosim.world.scene import Colour
 
 WHITE: Final[Colour] = (0.90, 0.90, 0.92, 1.0)
 Ceiling = Annotated[float, Quantity(units.LENGTH, "1 m", "100 km")]
@@ -173,34 +169,16 @@ def _length(vectors: Floats) -> Floats:
     actuators={"pilot": {"kind": "waypoint"}},
     units={"heading": ("rad",)},
 )
-class Rotorcraft(Model):
+class Rotorcraft(VehicleModel):
     """A rotorcraft that stays upright.
 
     `arrived` is 1 while it hovers at its waypoint, `blocked` whether an obstacle stopped it in the tick.
     """
 
-    def __init__(self, settings: RotorcraftRobot, at: Mounting) -> None:
-        self._settings, self._at = settings, at
-        self._position = at.slot("position").at
-        self._reach_m = self._fastest() * at.spec.tick_ns / 1e9
+    colour: ClassVar = WHITE
 
-    def _fastest(self) -> float:
-        """Return the greatest speed over ground and upwards together (m/s)."""
-        speed, climb = self._settings.speed, self._settings.climb
+    @property
+    def fastest(self) -> float:
+        """The greatest speed over ground and upwards together (m/s)."""
+        speed, climb = self.settings.speed, self.settings.climb
         return sqrt(speed * speed + climb * climb)
-
-    def body(self) -> Body:
-        """Return the cylinder around its rotors, a mark ahead, and the antenna's mast."""
-        return body_of(self._settings, self._at.robot.name, "rotorcraft", WHITE, self._fastest())
-
-    def upright(self) -> Upright:
-        """Return its cylinder for obstacles."""
-        return upright(self._settings)
-
-    def place(self, view: WritableView) -> None:
-        """Set it to its start, at rest."""
-        set_down(self._at, self._settings.at, view)
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Whether it is no farther away than its speed allows."""
-        return is_in_reach(numbers, before, self._position, self._reach_m)

@@ -10,8 +10,8 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.library.mobile.differential_drive import WheeledMotion
-from foosim.library.mobile.hall_bodies import DARK, mast, standing
 from foosim.library.mobile.hall_settings import Place, hall_of
+from foosim.library.mobile.vehicles import DARK, mast, standing
 from foosim.library.mobile.wheels import Wheels, slips_of
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings

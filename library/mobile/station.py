@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from foosim.library.mobile.hall_bodies import mast, standing
 from foosim.library.mobile.hall_settings import Place, hall_of
+from foosim.library.mobile.vehicles import mast, standing
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model

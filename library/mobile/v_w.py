@@ -16,7 +16,7 @@ from foosim.library.mobile.wheels import wheels_of
 from foosim.world.component_types.quantities import MetresPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 
@@ -35,14 +35,15 @@ class Motion(Struct, frozen=True):
     angular: Annotated[float, Meta(extra={"unit": "rad/s"})]
 
 
-@actuator("v_w", VWSettings, Motion, slots={"set_point": 2}, needs=("wheel_speeds",))
+@actuator("v_w", VWSettings, Motion, needs=("wheel_speeds",))
 class MotionActuator(Actuator):
     """The two wheels of a robot, as one motion."""
+
+    _set_point = slot(2)
 
     def __init__(self, settings: VWSettings, at: Mounting) -> None:
         """Raises BadValue for a model without wheels."""
         self._wheels = wheels_of(at.spec, at.layout, at.robot)
-        self._set_point = at.slot("set_point")
         self._at, self._half_track = self._set_point.at, self._wheels.track / 2.0
 
     def limits(self) -> dict[str, tuple[float, float]]:

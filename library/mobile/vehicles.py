@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Final
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import AfterValidator
 
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.library.mobile.hall_bodies import DARK, mast
 from foosim.world.component_types.settings import RobotSettings
+from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.matter.physics import DEFAULT
 from foosim.world.moving.upright import Upright
 from foosim.world.placing import ORIGIN_OF_WORLD, At, leaning
-from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, turn
+from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, Vector, turn
 
 Radius = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 m")]
 Height = Annotated[float, Quantity(units.LENGTH, "1 cm", "10 m")]
@@ -29,6 +29,8 @@ Slip = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
 
 ROUNDING: Final = 1.000001
 """A way is no longer than its speed allows, but for rounding."""
+DARK: Final[Colour] = (0.15, 0.15, 0.18, 1.0)
+MAST_RADIUS_M: Final = 0.01
 HULL: Final = DEFAULT
 """The surface of robots without rigid-body dynamics."""
 
@@ -54,11 +56,6 @@ class Vehicle(RobotSettings):
     antenna_height: Antenna = default("35 cm")
 
 
-def upright(vehicle: Vehicle) -> Upright:
-    """Return its cylinder for obstacles: its hull, up to the top of its antenna."""
-    return Upright(vehicle.radius, 0.0, max(vehicle.height, vehicle.antenna_height))
-
-
 def body_of(vehicle: Vehicle, name: str, model: str, colour: Colour, speed_limit: float) -> Body:
     """Return a round hull, a mark ahead on it, and the antenna's mast; it has no mass, since no engine moves it."""
     radius, height = vehicle.radius, vehicle.height
@@ -75,15 +72,62 @@ def mark_of(vehicle: Vehicle, surface: str) -> Shape:
     return Shape(mark, surface, DARK, (radius / 2, 0.0, height + height / 16), radio=PLASTIC)
 
 
-def set_down(at: Mounting, where: At, view: WritableView) -> None:
-    """Set an entity to where it starts, at rest."""
-    view.write(at.slot("position"), *where.position)
-    view.write(at.slot("orientation"), *turn((0.0, 0.0, 1.0), where.yaw))
-    view.write(at.slot("heading"), where.yaw)
+def standing(
+    name: str, model: str, at: Vector, joint: Literal["free", "fixed"], shapes: tuple[Shape, ...], antenna_m: float
+) -> Body:
+    """Return a body of one link. It has no mass: no engine moves it."""
+    link = Link(name, joint, shapes, 0.0, ORIGIN)
+    return Body(name, model, at, (link,), (0.0, 0.0, antenna_m))
 
 
-def is_in_reach(numbers: Sequence[float], before: Sequence[float], at: int, reach_m: float) -> bool:
-    """Whether the place that begins at `at` is no farther from where it was than a reach (m), but for rounding."""
-    dx, dy, dz = numbers[at] - before[at], numbers[at + 1] - before[at + 1], numbers[at + 2] - before[at + 2]
-    reach = reach_m * ROUNDING
-    return dx * dx + dy * dy + dz * dz <= reach * reach
+def mast(bottom: float, top: float, surface: str) -> tuple[Shape, ...]:
+    """Return the mast of an antenna that is higher than the hull below it, if it is."""
+    if top <= bottom:
+        return ()
+    pole = Cylinder(MAST_RADIUS_M, top - bottom)
+    return (Shape(pole, surface, DARK, (0.0, 0.0, (top + bottom) / 2), radio=PLASTIC),)
+
+
+class KinematicModel(Model):
+    """A model of entities that move by kinematics and start at rest at `at`, no faster than `fastest`."""
+
+    def __init__(self, settings: Any, at: Mounting) -> None:
+        super().__init__(settings, at)
+        self._position = at.slot("position").at
+        self._reach_m = self.fastest * at.spec.tick_ns / 1e9 * ROUNDING
+
+    @property
+    def fastest(self) -> float:
+        """The greatest speed of its place (m/s)."""
+        speed: float = self.settings.speed
+        return speed
+
+    def place(self, view: WritableView) -> None:
+        """Set it to its start, at rest."""
+        self.set_down(view, self.settings.at.position, self.settings.at.yaw)
+
+    def set_down(self, view: WritableView, position: Vector, yaw: float) -> None:
+        """Write its place (m) and its heading (rad)."""
+        view.write(self.at.slot("position"), *position)
+        view.write(self.at.slot("orientation"), *turn((0.0, 0.0, 1.0), yaw))
+        view.write(self.at.slot("heading"), yaw)
+
+    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
+        """Whether it is no farther away than its speed allows, but for rounding."""
+        at, reach_m = self._position, self._reach_m
+        dx, dy, dz = numbers[at] - before[at], numbers[at + 1] - before[at + 1], numbers[at + 2] - before[at + 2]
+        return dx * dx + dy * dy + dz * dz <= reach_m * reach_m
+
+
+class VehicleModel(KinematicModel):
+    """A model of round robots that move upright by kinematics."""
+
+    colour: ClassVar[Colour]
+
+    def body(self) -> Body:
+        """Return the hull, a mark ahead, and the antenna's mast."""
+        return body_of(self.settings, self.at.robot.name, self.at.robot.kind.name, self.colour, self.fastest)
+
+    def upright(self) -> Upright:
+        """Return its cylinder for obstacles: its hull, up to the top of its antenna."""
+        return Upright(self.settings.radius, 0.0, max(self.settings.height, self.settings.antenna_height))

@@ -15,10 +15,10 @@ from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.quantities import JobNumber, Metres, Radians
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
-from foosim.world.moving.progress import SLOTS, Patience, Progress
+from foosim.world.moving.progress import Approach, Patience
 from foosim.world.placing import FAR_M
 
 YAW_RAD_MAX: Final = 2.0 * PI
@@ -43,19 +43,18 @@ class Waypoint(Struct, frozen=True):
     job: JobNumber = 0.0
 
 
-@actuator(
-    "waypoint", WaypointSettings, Waypoint, slots={"given": 1, "target": 4, **SLOTS}, needs=("arrived",), jobs=True
-)
-class WaypointActuator(Actuator):
+@actuator("waypoint", WaypointSettings, Waypoint, jobs=True)
+class WaypointActuator(Approach):
     """Keeps the waypoint of the last command; without one the rotorcraft brakes, and hovers where it is."""
+
+    has_target, target = slot(), slot(4)
+    arrived, position, heading = need(), need(), need()
 
     def __init__(self, settings: WaypointSettings, at: Mounting) -> None:
         robot = at.spec.robots[at.robot.name]
         assert isinstance(robot, RotorcraftRobot), f"{at.robot.name} is no rotorcraft"
         self._robot = robot
-        self._given, self._target = at.slot("given"), at.slot("target")
-        self._position, self._heading = at.slot("position"), at.slot("heading")
-        self._arrived, self._progress = at.slot("arrived"), Progress(at, settings.patience_ns)
+        self.patience_ticks = settings.patience_ns // at.spec.tick_ns
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest of each coordinate (m) and of the yaw (rad)."""
@@ -68,30 +67,30 @@ class WaypointActuator(Actuator):
         return True
 
     def _set(self, view: WritableView, x: float, y: float, z: float, yaw: float) -> None:
-        view.write(self._given, 1.0)
-        view.write(self._target, x, y, z, yaw)
-        self._progress.begin(view)
+        view.write(self.has_target, 1.0)
+        view.write(self.target, x, y, z, yaw)
+        self.begin(view)
 
     def hold(self, view: WritableView) -> None:
         """Make the present place the waypoint."""
-        x, y, z = view.read(self._position)
-        self._set(view, x, y, z, view.read(self._heading)[0])
+        x, y, z = view.read(self.position)
+        self._set(view, x, y, z, view.read(self.heading)[0])
 
     def excite(self, view: WritableView) -> None:
         """Fly askew and up, for the run that compares engines."""
-        x, y, z = view.read(self._position)
-        self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self._heading)[0] + 1.0)
+        x, y, z = view.read(self.position)
+        self._set(view, x + 1.0, y + 0.5, z + 1.0, view.read(self.heading)[0] + 1.0)
 
     def progress(self, view: WritableView) -> JobState:
         """Return whether it hovers at its waypoint, by the way that is left (m and rad together)."""
-        left = [there - now for there, now in zip(view.read(self._target), self._pose(view), strict=True)]
+        left = [there - now for there, now in zip(view.read(self.target), self._pose(view), strict=True)]
         x, y, z, yaw = left
         way = sqrt(x * x + y * y + z * z) + abs(shorter(yaw))
-        return self._progress.judge(view, way, is_there=view.numbers[self._arrived.at] != 0.0)
+        return self.judge(view, way, is_there=view.numbers[self.arrived.at] != 0.0)
 
     def _pose(self, view: View) -> list[float]:
         """Return place (m) and heading (rad)."""
-        return [*view.read(self._position), *view.read(self._heading)]
+        return [*view.read(self.position), *view.read(self.heading)]
 
     def unpowered(self) -> Motors:
         """Return that there is no waypoint."""
@@ -99,8 +98,8 @@ class WaypointActuator(Actuator):
 
     def command(self, view: View) -> Motors:
         """Return place (m) and heading (rad) to come to, each with the greatest speed there (m/s, rad/s), if any."""
-        if view.numbers[self._given.at] == 0.0:
+        if view.numbers[self.has_target.at] == 0.0:
             return ()
-        x, y, z, yaw = view.read(self._target)
+        x, y, z, yaw = view.read(self.target)
         its = self._robot
         return (x, its.speed), (y, its.speed), (z, its.climb), (yaw, its.turn_rate)

@@ -11,7 +11,7 @@ from foosim.library.mobile.wheels import wheels_of
 from foosim.world.component_types.quantities import MetresPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 
@@ -30,14 +30,16 @@ class Drive(Struct, frozen=True):
     right: MetresPerSecond
 
 
-@actuator("wheel_speeds", WheelSpeedsSettings, Drive, slots={"set_point": 2}, needs=("wheel_speeds",))
+@actuator("wheel_speeds", WheelSpeedsSettings, Drive, needs=("wheel_speeds",))
 class DriveActuator(Actuator):
     """The two wheels of a robot."""
+
+    _set_point = slot(2)
 
     def __init__(self, settings: WheelSpeedsSettings, at: Mounting) -> None:
         """Raises BadValue for a model without wheels."""
         self._wheels = wheels_of(at.spec, at.layout, at.robot)
-        self._set_point, self._speed = at.slot("set_point"), self._wheels.speed
+        self._speed = self._wheels.speed
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest speed of each wheel (m/s)."""

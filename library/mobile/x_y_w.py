@@ -11,7 +11,7 @@ from foosim.library.mobile.holonomic import HolonomicRobot
 from foosim.world.component_types.quantities import MetresPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, slot
 from foosim.world.components.view import Mounting, View, WritableView
 
 
@@ -27,14 +27,15 @@ class Velocity(Struct, frozen=True):
     angular: Annotated[float, Meta(extra={"unit": "rad/s"})]
 
 
-@actuator("x_y_w", XYWSettings, Velocity, slots={"set_point": 3}, needs=("base_velocity",))
+@actuator("x_y_w", XYWSettings, Velocity, needs=("base_velocity",))
 class VelocityActuator(Actuator):
     """The drive of a base, which keeps the velocity of the last command."""
+
+    _set_point = slot(3)
 
     def __init__(self, settings: XYWSettings, at: Mounting) -> None:
         robot = at.spec.robots[at.robot.name]
         assert isinstance(robot, HolonomicRobot), f"{at.robot.name} is no base of the model holonomic"
-        self._set_point = at.slot("set_point")
         self._speed, self._turn_rate = robot.speed, robot.turn_rate
         self._acceleration, self._turning = robot.acceleration, robot.acceleration / robot.radius
 

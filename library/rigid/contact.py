@@ -9,8 +9,8 @@ from msgspec import Struct
 from foosim.world.component_types.quantities import Count, NewtonSeconds
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.view import Mounting, SlotReadings, View
+from foosim.world.components.base import Sensor, need
+from foosim.world.components.view import SlotReadings, View
 
 
 class ContactSettings(SensorSettings):
@@ -26,12 +26,11 @@ class Touches(Struct, frozen=True):
     substep: Count
 
 
-@sensor("contact", ContactSettings, Touches, needs=("contacts",), trigger="contacts")
+@sensor("contact", ContactSettings, Touches, trigger="contacts")
 class ContactSensor(Sensor):
     """Touches of a robot in the last tick: how many began, their impulse, the last substep with one."""
 
-    def __init__(self, settings: ContactSettings, at: Mounting) -> None:
-        self.contacts = at.slot("contacts")
+    contacts = need()
 
     def sample(self, view: View) -> Touches:
         return Touches(*view.read(self.contacts))

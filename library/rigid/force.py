@@ -10,7 +10,7 @@ from foosim.common import units
 from foosim.common.units import Quantity
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, slot
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, View, WritableView
@@ -40,13 +40,14 @@ class Push(Struct, frozen=True):
     torque_z: NewtonMetres
 
 
-@actuator("force", ForceSettings, Push, slots={"set_point": 6}, needs=("angular_velocity",), moves=False)
+@actuator("force", ForceSettings, Push, moves=False, needs=("angular_velocity",))
 class ForceActuator(Actuator):
     """Applies the force and torque of the last command throughout each tick."""
 
+    _set_point = slot(6)
+
     def __init__(self, settings: ForceSettings, at: Mounting) -> None:
         self._force, self._torque = settings.force, settings.torque
-        self._set_point = at.slot("set_point")
         self._back = conjugate(body_at(at).links[0].principal)
 
     def limits(self) -> dict[str, tuple[float, float]]:

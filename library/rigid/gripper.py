@@ -13,10 +13,10 @@ from msgspec import Struct
 
 from foosim.world.component_types import registry
 from foosim.world.component_types.descriptions import ENGINES, ENTITY, NO_ENTITY
-from foosim.world.component_types.jobs import FAILURE, JobState
+from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.quantities import JobNumber, Share
 from foosim.world.component_types.registry import actuator
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.grasping import GripperSettings, Portable, distance_from, grasp_of, portables_of
 from foosim.world.components.mounted import body_at, link_index
@@ -47,20 +47,15 @@ class Grip(Struct, frozen=True):
     job: JobNumber = 0.0
 
 
-@actuator(
-    "gripper",
-    GripperSettings,
-    Grip,
-    slots={"held": ENTITY, "grasp": 7, "wanted": 1, FAILURE: 1},
-    moves=False,
-    jobs=True,
-)
+@actuator("gripper", GripperSettings, Grip, moves=False, jobs=True)
 class Gripper(Actuator):
     """Takes the nearest object in its reach at a command to close, and releases it at a command to open.
 
     A job to close is done when it holds something, and fails where it can take nothing; one to open is done at once.
     """
 
+    held, grasp, closed, failure = slot(ENTITY), slot(7), slot(), slot()
+    quarantined = need()
     FAILURES: ClassVar = {
         GraspFailure.OUT_OF_REACH: "there is no object within reach",
         GraspFailure.NO_TAG: "the nearest object does not have the tag of the gripper",
@@ -73,9 +68,6 @@ class Gripper(Actuator):
         self._settings = settings
         self._body, self._robot = body_at(at), at.robot
         self._link = link_index(self._body, settings.at.link)
-        self._held, self._grasp = at.slot("held"), at.slot("grasp")
-        self._wanted, self._failure = at.slot("wanted"), at.slot(FAILURE)
-        self._quarantined = at.slot("quarantined")
         self._objects = [(one, self._mismatch(one)) for one in portables_of(at.spec, at.layout)]
         """Each with the reason why it can never be taken."""
 
@@ -106,23 +98,23 @@ class Gripper(Actuator):
 
     def accept(self, command: Grip, view: WritableView) -> bool:
         """Close or open. A robot in quarantine, which no node solves, does neither."""
-        if view.read(self._quarantined)[0] > 0.0:
-            view.write(self._failure, GraspFailure.QUARANTINED)
+        if view.read(self.quarantined)[0] > 0.0:
+            view.write(self.failure, GraspFailure.QUARANTINED)
             return False
         is_closed = command.closed >= HALF
         failure = GraspFailure.NONE
         if not is_closed:
-            view.write(self._held, NO_ENTITY)
-        elif view.read(self._held)[0] == NO_ENTITY:
+            view.write(self.held, NO_ENTITY)
+        elif view.read(self.held)[0] == NO_ENTITY:
             failure = self._take(view)
-        view.write(self._wanted, float(is_closed))
-        view.write(self._failure, failure)
+        view.write(self.closed, float(is_closed))
+        view.write(self.failure, failure)
         return True
 
     def progress(self, view: WritableView) -> JobState:
         """Return DONE if it holds something after a command to close, nothing after one to open; else FAILED."""
-        is_holding = view.read(self._held)[0] != NO_ENTITY
-        return JobState.DONE if is_holding == (view.read(self._wanted)[0] == 1.0) else JobState.FAILED
+        is_holding = view.read(self.held)[0] != NO_ENTITY
+        return JobState.DONE if is_holding == (view.read(self.closed)[0] == 1.0) else JobState.FAILED
 
     def _take(self, view: WritableView) -> GraspFailure:
         """Take the nearest object, ties by name, as it is at the start of the tick; else return why the nearest is not
@@ -144,8 +136,8 @@ class Gripper(Actuator):
         _, _, _, failure, entity = min(near)
         if failure == GraspFailure.NONE:
             place, turned = grasp_of(entity, start, position, orientation)
-            view.write(self._held, float(entity.index))
-            view.write(self._grasp, *place, *turned)
+            view.write(self.held, float(entity.index))
+            view.write(self.grasp, *place, *turned)
         return failure
 
     def hold(self, view: WritableView) -> None:

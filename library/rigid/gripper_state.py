@@ -38,7 +38,7 @@ class GripperSensor(Sensor):
             grippers = [slot.removesuffix(".held") for slot in offsets if slot.endswith(".held")]
             what = f"{at.robot.name} has no such gripper; there are {', '.join(grippers) or 'none'}"
             raise IncompatibleComponent(("gripper",), what, name, nearest_quoted(name, grippers))
-        self._wanted, self._held = (at.of(at.robot, f"{name}.{slot}") for slot in ("wanted", "held"))
+        self._closed, self._held = (at.of(at.robot, f"{name}.{slot}") for slot in ("closed", "held"))
         self._masses = {one.entity.index: one.mass_kg for one in portables_of(at.spec, at.layout)}
 
     @staticmethod
@@ -47,5 +47,5 @@ class GripperSensor(Sensor):
         GripperSensor(settings, at)
 
     def sample(self, view: View) -> GripperState:
-        (closed,), (held,) = view.read(self._wanted), view.read(self._held)
+        (closed,), (held,) = view.read(self._closed), view.read(self._held)
         return GripperState(closed, float(held >= 0.0), self._masses.get(int(held), 0.0))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from foosim.library.rigid.joints import JointGroup, JointLoopSettings, Positions, loop_points
+from foosim.library.rigid.joints import JointActuator, JointLoopSettings, Positions
 from foosim.world.component_types.registry import actuator
-from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 
@@ -24,51 +23,23 @@ class JointPositions(Struct, frozen=True):
     positions: Positions
 
 
-@actuator(
-    "joint_position",
-    JointPositionSettings,
-    JointPositions,
-    slots=loop_points,
-    needs=("joint_positions",),
-    joints="joints",
-)
-class JointPositionActuator(Actuator):
+@actuator("joint_position", JointPositionSettings, JointPositions, joints="joints")
+class JointPositionActuator(JointActuator):
     """A proportional loop: speed = gain x (set-point - position); the motor has at most the effort of the joint."""
 
     def __init__(self, settings: JointPositionSettings, at: Mounting) -> None:
-        self._group = JointGroup(settings, at)
+        super().__init__(settings, at)
         self._gain = settings.gain
-
-    @staticmethod
-    def check(settings: JointPositionSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a joint that the robot does not have."""
-        JointGroup(settings, at)
-
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return no bounds that are common to all joints: each has its own."""
-        return {}
 
     def bounds(self) -> tuple[tuple[float, float], ...]:
         """Return the least and the greatest position of each joint."""
-        return tuple(zip(self._group.lows, self._group.highs, strict=True))
-
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the numbers of a command: the links on the joints."""
-        return self._group.names
+        return tuple(zip(self.group.lows, self.group.highs, strict=True))
 
     def accept(self, command: JointPositions, view: WritableView) -> bool:
         """Take the set-points of all joints."""
-        view.write(self._group.set_point, *command.positions)
+        view.write(self.set_point, *command.positions)
         return True
-
-    def hold(self, view: WritableView) -> None:
-        """Make the present positions the set-points."""
-        view.write(self._group.set_point, *self._group.positions(view))
-
-    def excite(self, view: WritableView) -> None:
-        """Move each joint by a little, for the run that compares engines."""
-        view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
 
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor."""
-        return self._group.towards(view.read(self._group.set_point), view, self._gain)
+        return self.group.towards(view.read(self.set_point), view, self._gain)

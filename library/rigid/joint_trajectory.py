@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from enum import IntEnum
 from itertools import pairwise
 from typing import Annotated, ClassVar, Final
@@ -11,13 +10,12 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import default
-from foosim.library.rigid.joints import JointGroup, JointLoopSettings, Positions, loop_points
+from foosim.library.rigid.joints import JointActuator, JointLoopSettings, Positions, joint_count
 from foosim.library.rigid.spline import fastest, position_at
-from foosim.world.component_types.descriptions import Carrier
-from foosim.world.component_types.jobs import FAILURE, JobState
+from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.quantities import JobNumber
 from foosim.world.component_types.registry import actuator
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.moving.progress import Patience
@@ -62,34 +60,16 @@ class Trajectory(Struct, frozen=True):
     job: JobNumber = 0.0
 
 
-def _slots(settings: JointTrajectorySettings, carrier: Carrier) -> Mapping[str, int]:
-    found = loop_points(settings, carrier)
-    joints = found["set_point"]
-    return {
-        **found,
-        "begun": 1,
-        "count": 1,
-        FAILURE: 1,
-        "times": settings.points,
-        "positions": settings.points * joints,
-    }
-
-
-@actuator(
-    "joint_trajectory",
-    JointTrajectorySettings,
-    Trajectory,
-    slots=_slots,
-    needs=("joint_positions",),
-    joints="joints",
-    jobs=True,
-)
-class JointTrajectory(Actuator):
-    """Keeps the points of the last command, and the tick that it came in.
+@actuator("joint_trajectory", JointTrajectorySettings, Trajectory, joints="joints", jobs=True)
+class JointTrajectory(JointActuator):
+    """Keeps the points of the last command, and the tick in which it came.
 
     `set_point` is where its way began; without points it is where the joints stay.
     """
 
+    start_tick, count, failure = slot(), slot(), slot()
+    times = slot(lambda settings, carrier: settings.points)
+    positions = slot(lambda settings, carrier: settings.points * joint_count(settings, carrier))
     FAILURES: ClassVar = {
         TrajectoryFailure.POINTS: "it has no points, more than the actuator takes, or not as many positions as times",
         TrajectoryFailure.TIMES: "its times do not rise",
@@ -100,29 +80,19 @@ class JointTrajectory(Actuator):
     }
 
     def __init__(self, settings: JointTrajectorySettings, at: Mounting) -> None:
-        self._group, self._gain = JointGroup(settings, at), settings.gain
-        self._begun, self._count = at.slot("begun"), at.slot("count")
-        self._times, self._positions, self._failure = at.slot("times"), at.slot("positions"), at.slot(FAILURE)
+        super().__init__(settings, at)
+        self._gain = settings.gain
         self._tolerance, self._tick_s = settings.tolerance, at.spec.tick_ns / 1e9
         self._patience_s = settings.patience_ns / 1e9
-
-    @staticmethod
-    def check(settings: JointTrajectorySettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a joint that the robot does not have."""
-        JointGroup(settings, at)
-
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return no bounds: points beyond the limits of a joint are refused."""
-        return {}
 
     def problem(self, command: Trajectory) -> str:
         """Return why a command is refused for any state of the joints; empty for a valid one."""
         return self._refusal(command)[1]
 
     def _refusal(self, command: Trajectory) -> tuple[TrajectoryFailure, str]:
-        group, times, rows = self._group, command.times, command.positions
-        if not 1 <= len(times) <= self._times.size or len(rows) != len(times):
-            what = f"{len(times)} times and positions at {len(rows)}: as many are valid, 1 to {self._times.size}"
+        group, times, rows = self.group, command.times, command.positions
+        if not 1 <= len(times) <= self.times.size or len(rows) != len(times):
+            what = f"{len(times)} times and positions at {len(rows)}: as many are valid, 1 to {self.times.size}"
             return TrajectoryFailure.POINTS, what
         if not all(before < time for before, time in pairwise(times)):
             return TrajectoryFailure.TIMES, "its times do not rise"
@@ -139,30 +109,26 @@ class JointTrajectory(Actuator):
     def accept(self, command: Trajectory, view: WritableView) -> bool:
         """Take points; False if they are invalid or too fast for a joint."""
         failure, _ = self._refusal(command)
-        start, times = self._group.positions(view), (0.0, *command.times)
+        start, times = self.group.positions(view), (0.0, *command.times)
         if failure == TrajectoryFailure.NONE:
             ways = zip(start, *command.positions, strict=True)
-            if not all(fastest(times, way) <= most for way, most in zip(ways, self._group.speeds, strict=True)):
+            if not all(fastest(times, way) <= most for way, most in zip(ways, self.group.speeds, strict=True)):
                 failure = TrajectoryFailure.SPEED
-        view.write(self._failure, failure)
+        view.write(self.failure, failure)
         if failure != TrajectoryFailure.NONE:
             return False
         numbers = [position for row in command.positions for position in row]
-        view.write(self._group.set_point, *start)
-        view.write(self._begun, view.tick)
-        view.write(self._count, len(command.times))
-        view.write(self._times, *command.times, *[0.0] * (self._times.size - len(command.times)))
-        view.write(self._positions, *numbers, *[0.0] * (self._positions.size - len(numbers)))
+        view.write(self.set_point, *start)
+        view.write(self.start_tick, view.tick)
+        view.write(self.count, len(command.times))
+        view.write(self.times, *command.times, *[0.0] * (self.times.size - len(command.times)))
+        view.write(self.positions, *numbers, *[0.0] * (self.positions.size - len(numbers)))
         return True
 
     def hold(self, view: WritableView) -> None:
         """Stay at the present positions."""
-        view.write(self._count, 0.0)
-        view.write(self._group.set_point, *self._group.positions(view))
-
-    def excite(self, view: WritableView) -> None:
-        """Move each joint by a little, for the run that compares engines."""
-        view.write(self._group.set_point, *[position + 0.2 for position in self._group.positions(view)])
+        view.write(self.count, 0.0)
+        super().hold(view)
 
     def progress(self, view: WritableView) -> JobState:
         """Return whether the joints are where the way ends, after its end."""
@@ -170,23 +136,23 @@ class JointTrajectory(Actuator):
         over_s = self._since_s(view, view.tick + 1) - times[-1]
         if over_s < 0.0:
             return JobState.RUNNING
-        left = [abs(way[-1] - at) for way, at in zip(ways, self._group.positions(view), strict=True)]
+        left = [abs(way[-1] - at) for way, at in zip(ways, self.group.positions(view), strict=True)]
         if max(left) <= self._tolerance:
             return JobState.DONE
         if over_s < self._patience_s:
             return JobState.RUNNING
-        view.write(self._failure, TrajectoryFailure.LATE)
+        view.write(self.failure, TrajectoryFailure.LATE)
         return JobState.FAILED
 
     def _way(self, view: View) -> tuple[tuple[float, ...], list[tuple[float, ...]]]:
         """Return times (s), from 0 on, and for each joint its positions at these."""
-        count, joints = int(view.numbers[self._count.at]), self._group.set_point.size
-        numbers = (*view.read(self._group.set_point), *view.read(self._positions)[: count * joints])
-        return (0.0, *view.read(self._times)[:count]), [numbers[joint::joints] for joint in range(joints)]
+        count, joints = int(view.numbers[self.count.at]), self.set_point.size
+        numbers = (*view.read(self.set_point), *view.read(self.positions)[: count * joints])
+        return (0.0, *view.read(self.times)[:count]), [numbers[joint::joints] for joint in range(joints)]
 
     def _since_s(self, view: View, tick: int) -> float:
         """Return how long ago the way began."""
-        return (tick - view.numbers[self._begun.at]) * self._tick_s
+        return (tick - view.numbers[self.start_tick.at]) * self._tick_s
 
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor.
@@ -197,4 +163,4 @@ class JointTrajectory(Actuator):
         since_s, lead = self._since_s(view, view.tick), 1.0 / (self._gain * self._tick_s)
         now = [position_at(times, way, since_s) for way in ways]
         soon = [position_at(times, way, since_s + self._tick_s) for way in ways]
-        return self._group.towards([at + (to - at) * lead for at, to in zip(now, soon, strict=True)], view, self._gain)
+        return self.group.towards([at + (to - at) * lead for at, to in zip(now, soon, strict=True)], view, self._gain)

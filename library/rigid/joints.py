@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import inf
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from msgspec import Meta
 from pydantic import Field
@@ -15,9 +15,10 @@ from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
 from foosim.world.component_types.descriptions import JOINTS_MAX, Carrier
 from foosim.world.component_types.settings import ActuatorSettings
+from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, joint_indices
-from foosim.world.components.view import Mounting, Slot, View
+from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.scene import Link
 
 FORCE_MAX: Final = 1e6
@@ -48,23 +49,21 @@ class JointLoopSettings(JointSettings):
     gain: Gain = default("20 Hz")
 
 
-def set_points(settings: JointSettings, carrier: Carrier) -> Mapping[str, int]:
-    """Return the slots of an actuator of joints: a set-point for each. Raises BadValue for a robot without joints."""
+def joint_count(settings: JointSettings, carrier: Carrier) -> int:
+    """Return the count of joints that an actuator drives.
+
+    Raises BadValue for a robot without joints, and for the gain of a loop that overshoots.
+    """
+    most = 1e9 / carrier.period_ns
+    if isinstance(settings, JointLoopSettings) and settings.gain > most:
+        raise BadValue(f"a gain that overshoots: at most the inverse of a tick, {most:g} Hz, is stable", settings.gain)
     if carrier.joints == 0:
         raise BadValue("the robot has no joints", settings.kind)
     if settings.joints is None:
-        return {"set_point": carrier.joints}
+        return carrier.joints
     if len(settings.joints) > carrier.joints or len(set(settings.joints)) < len(settings.joints):
         raise BadValue(f"{carrier.joints} joints, each once, are valid", settings.joints)
-    return {"set_point": len(settings.joints)}
-
-
-def loop_points(settings: JointLoopSettings, carrier: Carrier) -> Mapping[str, int]:
-    """Return the slots of a loop: as `set_points`. Raises BadValue for a gain that overshoots, too."""
-    most = 1e9 / carrier.period_ns
-    if settings.gain > most:
-        raise BadValue(f"a gain that overshoots: at most the inverse of a tick, {most:g} Hz, is stable", settings.gain)
-    return set_points(settings, carrier)
+    return len(settings.joints)
 
 
 class JointGroup:
@@ -79,7 +78,6 @@ class JointGroup:
         self.names = tuple(f"joint of {link}" for link in links)
         """What the numbers of a command are of."""
         self.links: tuple[Link, ...] = tuple(body.joints[index] for index in self.indices)
-        self.set_point: Slot = at.slot("set_point")
         start = at.robot.offsets["joint_positions"]
         self._positions = [start + index for index in self.indices]
         self.forces = tuple(min(link.effort, FORCE_MAX) for link in self.links)
@@ -95,3 +93,30 @@ class JointGroup:
         """Return speed and greatest force of each motor: gain x (wanted - position), at most the speed of the joint."""
         drives = zip(wanted, self.positions(view), self.speeds, self.forces, strict=True)
         return tuple([(min(max(gain * (to - at), -most), most), force) for to, at, most, force in drives])
+
+
+class JointActuator(Actuator):
+    """An actuator that keeps a set-point for each joint."""
+
+    set_point = slot(joint_count)
+    joint_positions = need()
+
+    def __init__(self, settings: JointSettings, at: Mounting) -> None:
+        self.group = JointGroup(settings, at)
+
+    @staticmethod
+    def check(settings: Any, at: Mounting) -> None:
+        """Raise IncompatibleComponent for a joint that the robot does not have."""
+        JointGroup(settings, at)
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the numbers of a command: the links on the joints."""
+        return self.group.names
+
+    def hold(self, view: WritableView) -> None:
+        """Make the present positions the set-points."""
+        view.write(self.set_point, *self.group.positions(view))
+
+    def excite(self, view: WritableView) -> None:
+        """Move each joint by a little, for the run that compares engines."""
+        view.write(self.set_point, *[position + 0.2 for position in self.group.positions(view)])

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import copysign, pi, sqrt
 from typing import Final
 
 from msgspec import Struct
 
 from foosim.common.exact_math import atan2
-from foosim.library.rigid.pan_tilt import PanTiltSettings, hangs_on, pan_tilt_of, pan_tilt_slots
-from foosim.world.component_types.descriptions import Carrier
+from foosim.library.rigid.joints import JointActuator
+from foosim.library.rigid.pan_tilt import PanTiltSettings, hangs_on, pan_tilt_of
 from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.quantities import JobNumber, Metres
 from foosim.world.component_types.registry import actuator
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at, link_index
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.kinematics import forward_kinematics
-from foosim.world.moving.progress import Progress
+from foosim.world.moving.progress import Approach
 from foosim.world.placing import FAR_M, FIRST_LINK, MountedAt
 from foosim.world.scene import Pose, Vector, cross, dot, moved, multiply, rotate
 
@@ -46,12 +45,8 @@ class Sight(Struct, frozen=True):
     job: JobNumber = 0.0
 
 
-def _slots(settings: LookAtSettings, carrier: Carrier) -> Mapping[str, int]:
-    return {**pan_tilt_slots(settings, carrier), "given": 1, "target": 3}
-
-
-@actuator("look_at", LookAtSettings, Sight, slots=_slots, needs=("joint_positions",), joints="joints", jobs=True)
-class LookAt(Actuator):
+@actuator("look_at", LookAtSettings, Sight, joints="joints", jobs=True)
+class LookAt(JointActuator, Approach):
     """Keeps the place of the last command, and turns towards it.
 
     Pan turns by the angle about its axis between where it looks and the place, tilt by that between their heights. Both
@@ -59,13 +54,14 @@ class LookAt(Actuator):
     robot moves, the loop makes up for it tick by tick.
     """
 
+    has_target, target = slot(), slot(3)
+
     def __init__(self, settings: LookAtSettings, at: Mounting) -> None:
-        self._group, self._settings = pan_tilt_of(settings, at), settings
+        self.group, self._settings = pan_tilt_of(settings, at), settings
         self._body, self._robot = body_at(at), at.robot
-        self._pan, self._tilt = (self._body.links.index(link) for link in self._group.links)
+        self._pan, self._tilt = (self._body.links.index(link) for link in self.group.links)
         self._eye = self._tilt if settings.at.link is None else link_index(self._body, settings.at.link)
-        self._given, self._target = at.slot("given"), at.slot("target")
-        self._progress = Progress(at, settings.patience_ns)
+        self.patience_ticks = settings.patience_ns // at.spec.tick_ns
 
     @staticmethod
     def check(settings: LookAtSettings, at: Mounting) -> None:
@@ -80,42 +76,38 @@ class LookAt(Actuator):
 
     def accept(self, command: Sight, view: WritableView) -> bool:
         """Take a place."""
-        view.write(self._given, 1.0)
-        view.write(self._target, command.x, command.y, command.z)
-        self._progress.begin(view)
+        view.write(self.has_target, 1.0)
+        view.write(self.target, command.x, command.y, command.z)
+        self.begin(view)
         return True
 
     def hold(self, view: WritableView) -> None:
         """Stay at the present angles."""
-        view.write(self._given, 0.0)
-        view.write(self._group.set_point, *self._group.positions(view))
-        self._progress.begin(view)
-
-    def excite(self, view: WritableView) -> None:
-        """Turn a little, for the run that compares engines."""
-        view.write(self._group.set_point, *[angle + 0.2 for angle in self._group.positions(view)])
+        view.write(self.has_target, 0.0)
+        super().hold(view)
+        self.begin(view)
 
     def progress(self, view: WritableView) -> JobState:
         """Return whether it looks at the place, by the way of both joints that is left (rad), maybe the long one."""
         _, ahead, way = self._sight(view)
-        aside, angles = cross(ahead, way), self._group.positions(view)
+        aside, angles = cross(ahead, way), self.group.positions(view)
         angle = atan2(sqrt(dot(aside, aside)), dot(ahead, way))
         left = sum([abs(to - at) for to, at in zip(self._wanted(view), angles, strict=True)])
-        return self._progress.judge(view, left, is_there=angle <= self._settings.tolerance)
+        return self.judge(view, left, is_there=angle <= self._settings.tolerance)
 
     def _sight(self, view: View) -> tuple[list[Pose], Vector, Vector]:
         """Return the poses of the links, where it looks (of length 1) and the way to the place (m): world frame."""
         poses, at = forward_kinematics(self._body, self._robot, view.numbers), self._settings.at
         _, position, orientation = poses[self._eye]
         ahead = rotate(multiply(orientation, at.orientation), AHEAD)
-        x, y, z = view.read(self._target)
+        x, y, z = view.read(self.target)
         return poses, ahead, moved((x, y, z), moved(position, rotate(orientation, at.position), 1.0), -1.0)
 
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of both motors."""
-        is_given = view.numbers[self._given.at] != 0.0
-        wanted = self._wanted(view) if is_given else view.read(self._group.set_point)
-        return self._group.towards(wanted, view, self._settings.gain)
+        is_given = view.numbers[self.has_target.at] != 0.0
+        wanted = self._wanted(view) if is_given else view.read(self.set_point)
+        return self.group.towards(wanted, view, self._settings.gain)
 
     def _wanted(self, view: View) -> list[float]:
         """Return the angles of both joints with which it looks at the place, or nearest to it (rad)."""
@@ -124,7 +116,7 @@ class LookAt(Actuator):
         side = atan2(dot(cross(ahead, way), pan), dot(ahead, way) - dot(ahead, pan) * dot(way, pan))
         up = _height(way, pan) - _height(ahead, pan)
         turns = side, copysign(up, up * dot(cross(tilt, ahead), pan))
-        ends = zip(self._group.positions(view), turns, self._group.lows, self._group.highs, strict=True)
+        ends = zip(self.group.positions(view), turns, self.group.lows, self.group.highs, strict=True)
         return [_within(angle + more, low, high) for angle, more, low, high in ends]
 
 

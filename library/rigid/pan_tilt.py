@@ -5,7 +5,6 @@ A job is done when both angles are within tolerance.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated
 
 from msgspec import Struct
@@ -13,16 +12,14 @@ from msgspec import Struct
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
-from foosim.library.rigid.joints import JointGroup, JointLoopSettings, loop_points
-from foosim.world.component_types.descriptions import Carrier
+from foosim.library.rigid.joints import JointActuator, JointGroup, JointLoopSettings
 from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.quantities import JobNumber, Radians
 from foosim.world.component_types.registry import actuator
-from foosim.world.components.base import Actuator
 from foosim.world.components.entities import Motors
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
-from foosim.world.moving.progress import SLOTS, Patience, Progress
+from foosim.world.moving.progress import Approach, Patience
 from foosim.world.scene import Body
 
 Tolerance = Annotated[float, Quantity(units.ANGLE, "0.001 deg", "90 deg")]
@@ -36,11 +33,6 @@ class PanTiltSettings(JointLoopSettings):
 
     tolerance: Tolerance = default("1 deg")
     patience_ns: Patience = default("2 s", "patience")
-
-
-def pan_tilt_slots(settings: PanTiltSettings, carrier: Carrier) -> Mapping[str, int]:
-    """Return the slots of their drives. Raises BadValue."""
-    return {**loop_points(settings, carrier), **SLOTS}
 
 
 def pan_tilt_of(settings: PanTiltSettings, at: Mounting) -> JointGroup:
@@ -71,21 +63,13 @@ class PanTiltAngles(Struct, frozen=True):
     job: JobNumber = 0.0
 
 
-@actuator(
-    "pan_tilt",
-    PanTiltSettings,
-    PanTiltAngles,
-    slots=pan_tilt_slots,
-    needs=("joint_positions",),
-    joints="joints",
-    jobs=True,
-)
-class PanTilt(Actuator):
+@actuator("pan_tilt", PanTiltSettings, PanTiltAngles, joints="joints", jobs=True)
+class PanTilt(JointActuator, Approach):
     """Keeps the angles of the last command by a proportional loop, as `joint_position` does."""
 
     def __init__(self, settings: PanTiltSettings, at: Mounting) -> None:
         self.group, self._settings = pan_tilt_of(settings, at), settings
-        self._progress = Progress(at, settings.patience_ns)
+        self.patience_ticks = settings.patience_ns // at.spec.tick_ns
 
     @staticmethod
     def check(settings: PanTiltSettings, at: Mounting) -> None:
@@ -103,8 +87,8 @@ class PanTilt(Actuator):
         return True
 
     def _set(self, view: WritableView, angles: list[float]) -> None:
-        view.write(self.group.set_point, *angles)
-        self._progress.begin(view)
+        view.write(self.set_point, *angles)
+        self.begin(view)
 
     def hold(self, view: WritableView) -> None:
         """Stay at the present angles."""
@@ -116,10 +100,10 @@ class PanTilt(Actuator):
 
     def progress(self, view: WritableView) -> JobState:
         """Return whether both joints are there."""
-        wanted, angles = view.read(self.group.set_point), self.group.positions(view)
+        wanted, angles = view.read(self.set_point), self.group.positions(view)
         left = [abs(to - at) for to, at in zip(wanted, angles, strict=True)]
-        return self._progress.judge(view, sum(left), is_there=max(left) <= self._settings.tolerance)
+        return self.judge(view, sum(left), is_there=max(left) <= self._settings.tolerance)
 
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of both motors."""
-        return self.group.towards(view.read(self.group.set_point), view, self._settings.gain)
+        return self.group.towards(view.read(self.set_point), view, self._settings.gain)

@@ -9,8 +9,8 @@ from msgspec import Struct
 from foosim.world.component_types.quantities import Metres, Radians
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.view import Mounting, SlotReadings, View
+from foosim.world.components.base import Sensor, need
+from foosim.world.components.view import SlotReadings, View
 
 
 class EncoderSettings(SensorSettings):
@@ -24,17 +24,16 @@ class RodPosition(Struct, frozen=True):
     spin: Radians
 
 
-@sensor("encoder", EncoderSettings, RodPosition, needs=("joint_positions",))
+@sensor("encoder", EncoderSettings, RodPosition)
 class Encoder(Sensor):
     """Slide and spin of a rod."""
 
-    def __init__(self, settings: EncoderSettings, at: Mounting) -> None:
-        self.joints = at.slot("joint_positions")
+    joint_positions = need()
 
     def sample(self, view: View) -> RodPosition:
-        return RodPosition(*view.read(self.joints))
+        return RodPosition(*view.read(self.joint_positions))
 
     @staticmethod
     def together(sensors: Sequence[Encoder]) -> SlotReadings:
         """Return these as one."""
-        return SlotReadings([one.joints.places for one in sensors])
+        return SlotReadings([one.joint_positions.places for one in sensors])

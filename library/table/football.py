@@ -15,7 +15,7 @@ from foosim.library.table.settings import TEAMS, places_between_lines, rod_reach
 from foosim.world.component_types.descriptions import ENTITY, NO_ENTITY
 from foosim.world.component_types.registry import rule
 from foosim.world.component_types.settings import RuleSettings
-from foosim.world.components.base import Rule
+from foosim.world.components.base import Rule, slot
 from foosim.world.components.entities import Marked, MarkKind, RuleMounting, mounting_of
 from foosim.world.components.view import View, WritableView
 from foosim.world.layout import WORLD, Entity
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 OF_BALL: Final = {"still_ticks": 1, "out_ticks": 1, "wait_ticks": 1, "spot": 2, "serve": 1, "touched_by": ENTITY}
 """Ticks that a ball has been at rest or off the table, and that it still has to wait for its kick-off; where that is
 (x, y) and towards which end (-1, 1, or 0 for a draw); and the rod that touched it last since then."""
-OF_WORLD: Final = {"score": 2, "own_goals": 2, "kickoffs": 1, "played_ticks": 1, "is_over": 1, "over_since": 1}
-"""Goals of red and blue, own goals of their figures, kick-offs; ticks with a ball in play; whether the match is over,
-and since which tick."""
 LAST_SUBSTEP: Final = 2
 """Where a contact log has the last substep with a contact, -1 for none."""
 GOAL, OWN_GOAL, KICKOFF, OUT, DEAD, END = "goal", "own_goal", "kickoff", "out", "dead", "end"
@@ -45,14 +42,7 @@ def kickoff_ticks(spec: WorldSpec) -> int:
     return max(1, table_of(spec).rules.kickoff_delay_ns // spec.tick_ns)
 
 
-@rule(
-    "football",
-    FootballSettings,
-    slots=OF_WORLD,
-    each={"ball": OF_BALL},
-    writes=("ball",),
-    kit="table",
-)
+@rule("football", FootballSettings, each={"ball": OF_BALL}, writes=("ball",), kit="table")
 class Football(Rule):
     """Goal and own goal, kick-off, dead ball, ball off the table, clock and end of a match."""
 
@@ -64,6 +54,10 @@ class Football(Rule):
         DEAD: MarkKind("rest", "lay still", is_cut=True),
         END: MarkKind("rest", "ends of matches", is_cut=True),
     }
+    score, own_goals = slot(2), slot(2)
+    """Goals of red and blue, and own goals of their figures."""
+    kickoffs, played_ticks, is_over, end_tick = slot(), slot(), slot(), slot()
+    """Kick-offs; ticks with a ball in play; whether the match is over, and since which tick."""
 
     def __init__(self, settings: FootballSettings, at: RuleMounting) -> None:
         spec = at.spec
@@ -87,10 +81,6 @@ class Football(Rule):
         self._tick_s = tick_ns / 1e9
         self._radius = table.ball.radius
         self._key = draw_key(spec.seed, "kickoff")
-        self._score, self._own_goals, self._kickoffs = at.slot("score"), at.slot("own_goals"), at.slot("kickoffs")
-        self._played, self._is_over, self._over_since = (
-            at.slot(field) for field in ("played_ticks", "is_over", "over_since")
-        )
         self._balls = [_Ball(at, entity) for entity in at.layout.of("ball")]
         self._touches = _Touches(at)
 
@@ -102,7 +92,7 @@ class Football(Rule):
     def apply(self, view: WritableView) -> None:
         """Apply every rule to every ball, and count the time of play, until the match is over."""
         numbers = view.numbers
-        if numbers[self._is_over.at] != 0.0:
+        if numbers[self.is_over.at] != 0.0:
             return
         is_played = False
         for ball in self._balls:
@@ -111,7 +101,7 @@ class Football(Rule):
             is_played = is_played or numbers[ball.wait.at] == 0.0
             self._apply_to(ball, view)
         if is_played:
-            view.write(self._played, numbers[self._played.at] + 1.0)
+            view.write(self.played_ticks, numbers[self.played_ticks.at] + 1.0)
         if self._is_decided(view):
             self._end(view)
 
@@ -137,9 +127,9 @@ class Football(Rule):
         """A goal counts for the team that attacks it; after a last touch by the other team it is that team's own
         goal."""
         other = 1 - team
-        view.write(self._score, *_one_more(view.read(self._score), team))
+        view.write(self.score, *_one_more(view.read(self.score), team))
         if self._touches.team_of(view.numbers[ball.touched_by.at]) == other:
-            view.write(self._own_goals, *_one_more(view.read(self._own_goals), other))
+            view.write(self.own_goals, *_one_more(view.read(self.own_goals), other))
         self._to(ball, view, serve=(1.0 if team == 0 else -1.0) if self._is_conceders else 0.0)
 
     def _count_out(self, ball: _Ball, view: WritableView, x: float, y: float, z: float) -> None:
@@ -180,9 +170,9 @@ class Football(Rule):
 
     def _kick_off(self, ball: _Ball, view: WritableView) -> None:
         """Roll the ball from where it waits; an unset direction is drawn by the kick-off's number."""
-        (kickoffs,) = view.read(self._kickoffs)
+        (kickoffs,) = view.read(self.kickoffs)
         words = draw_words(self._key, int(kickoffs))
-        view.write(self._kickoffs, kickoffs + 1.0)
+        view.write(self.kickoffs, kickoffs + 1.0)
         (serve,), (x, y) = view.read(ball.serve), view.read(ball.spot)
         along = serve or (1.0 if words[0] & 1 else -1.0)
         across = 2.0 * unit_interval(words[1]) - 1.0
@@ -191,14 +181,14 @@ class Football(Rule):
     def _is_decided(self, view: WritableView) -> bool:
         """Whether the time is over, or a team has as many goals as end the match."""
         ticks, goals = self._match_ticks, self._match_goals
-        return (ticks is not None and view.numbers[self._played.at] >= ticks) or (
-            goals is not None and max(view.read(self._score)) >= goals
+        return (ticks is not None and view.numbers[self.played_ticks.at] >= ticks) or (
+            goals is not None and max(view.read(self.score)) >= goals
         )
 
     def _end(self, view: WritableView) -> None:
         """Lay the balls on the middle line, at rest, where no figure reaches them."""
-        view.write(self._is_over, 1.0)
-        view.write(self._over_since, float(view.tick))
+        view.write(self.is_over, 1.0)
+        view.write(self.end_tick, float(view.tick))
         for number, ball in enumerate([ball for ball in self._balls if not ball.entity.is_absent(view.numbers)]):
             aside = 2.0 * self._radius * (number + number % 2) * (-1.0) ** number
             ball.place(view, (0.0, aside, self._radius))
@@ -207,9 +197,9 @@ class Football(Rule):
         """Return goals and own goals of both teams, the time of play (s), whether it is over, and who has won (None: a
         draw, or not yet known)."""
         score, own_goals = (
-            dict(zip(TEAMS, map(int, view.read(slot)), strict=True)) for slot in (self._score, self._own_goals)
+            dict(zip(TEAMS, map(int, view.read(slot)), strict=True)) for slot in (self.score, self.own_goals)
         )
-        (played,), (is_over,) = view.read(self._played), view.read(self._is_over)
+        (played,), (is_over,) = view.read(self.played_ticks), view.read(self.is_over)
         first, second = score.values()
         winner = None if not is_over or first == second else TEAMS[0 if first > second else 1]
         return {
@@ -243,7 +233,7 @@ class Football(Rule):
             if waited and before.tick + waited <= after.tick:
                 kickoffs += 1
                 yield before.tick + waited, KICKOFF, f"kick-off of {ball.name}"
-        since = int(after.at(WORLD, f"{self._name}.over_since"))
+        since = int(after.at(WORLD, f"{self._name}.end_tick"))
         is_end = bool(after.at(WORLD, f"{self._name}.is_over") > before.at(WORLD, f"{self._name}.is_over"))
         goals = self._goals(before, after, [*(tick for tick, _ in returned), *([since] if is_end else [])])
         yield from goals
@@ -302,8 +292,8 @@ class _Ball:
     def place(self, view: WritableView, position: Vector, velocity: Vector = ORIGIN) -> None:
         """Set it to a place (m) with a velocity (m/s), and reset its counts and its last touch."""
         self._model.place_at(view, position, velocity)
-        for slot in (self.still, self.out, self.wait):
-            view.write(slot, 0.0)
+        for count in (self.still, self.out, self.wait):
+            view.write(count, 0.0)
         view.write(self.touched_by, NO_ENTITY)
 
 

@@ -11,7 +11,7 @@ from foosim.library.table.rod_drives import ForceConstant, RodVoltageSettings, T
 from foosim.world.component_types.quantities import Amperes
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
+from foosim.world.components.base import Sensor, need
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
 
@@ -38,13 +38,14 @@ class Currents(Struct, frozen=True):
     spin: Amperes
 
 
-@sensor("motor_current", MotorCurrentSettings, Currents, needs=("joint_efforts",), kit="table")
+@sensor("motor_current", MotorCurrentSettings, Currents, kit="table")
 class MotorCurrent(Sensor):
     """The currents of a rod's motors: force and torque in the last substep over the motors' constants."""
 
+    efforts = need("joint_efforts")
+
     def __init__(self, settings: MotorCurrentSettings, at: Mounting) -> None:
         self.along, self.around = _constants(settings, at)
-        self.efforts = at.slot("joint_efforts")
 
     @staticmethod
     def check(settings: MotorCurrentSettings, at: Mounting) -> None:

@@ -16,7 +16,7 @@ from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
 from foosim.library.table.settings import table_of
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.moving.upright import made_model
 from foosim.world.scene import load_of
@@ -112,10 +112,9 @@ class RodSetPoint(Actuator):
     """Its set-points follow from the state of its rod alone."""
     excites: ClassVar = (0.1, 0.5)
     """Shares of the bounds that `excite` sets."""
-
-    def __init__(self, at: Mounting, bounds: tuple[float, float]) -> None:
-        """`bounds` are the greatest numbers of slide and spin in either direction, in the units of the command."""
-        self._set_point, self._bounds = at.slot("set_point"), bounds
+    _set_point, joint_positions = slot(2), need()
+    _bounds: tuple[float, float]
+    """The greatest numbers of slide and spin in either direction, in the units of the command."""
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and the greatest numbers."""

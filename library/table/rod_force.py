@@ -26,7 +26,7 @@ class RodForce(Struct, frozen=True):
     spin: NewtonMetres
 
 
-@actuator("rod_force", RodForceSettings, RodForce, slots={"set_point": 2}, needs=("joint_positions",), kit="table")
+@actuator("rod_force", RodForceSettings, RodForce, kit="table")
 class ForceActuator(RodSetPoint):
     """Motors that apply the force and the torque of the last command, up to their greatest speeds."""
 
@@ -34,8 +34,8 @@ class ForceActuator(RodSetPoint):
 
     def __init__(self, settings: RodForceSettings, at: Mounting) -> None:
         limits = RodLimits(at)
-        super().__init__(at, limits.forces)
         self._speeds, self._forces = limits.speeds, limits.forces
+        self._bounds = limits.forces
 
     def command(self, view: View) -> Motors:
         """Return the greatest speed in the direction of each effort, and the effort, of slide and spin, in SI units."""

@@ -15,7 +15,7 @@ from foosim.library.table.settings import table_of
 from foosim.world.component_types.quantities import Metres, Radians
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.view import Mounting, View, WritableView
 
 ANGLE_RAD_MAX: Final = 1000.0
@@ -33,24 +33,17 @@ class Command(Struct, frozen=True):
     spin: Radians
 
 
-@actuator(
-    "rod_position",
-    RodPositionSettings,
-    Command,
-    slots={"set_point": 2},
-    needs=("joint_positions",),
-    kit="table",
-)
+@actuator("rod_position", RodPositionSettings, Command, kit="table")
 class PositionActuator(Actuator):
     """A proportional loop from a rod's set-point to the speeds of its motors."""
 
     steady: ClassVar = True
     """Its set-points follow from the state of its rod alone."""
+    _set_point, _joints = slot(2), need("joint_positions")
 
     def __init__(self, settings: RodPositionSettings, at: Mounting) -> None:
         drive, limits = table_of(at.spec).drive, RodLimits(at)
         self._slide_m_max = limits.half_stroke
-        self._set_point, self._joints = at.slot("set_point"), at.slot("joint_positions")
         self._set_point_at, self._joints_at = self._set_point.at, self._joints.at
         force, torque = limits.forces
         self._slide = (drive.slide.gain, drive.slide.speed, force)

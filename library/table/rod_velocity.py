@@ -23,16 +23,13 @@ class RodVelocity(Struct, frozen=True):
     spin: RadiansPerSecond
 
 
-@actuator(
-    "rod_velocity", RodVelocitySettings, RodVelocity, slots={"set_point": 2}, needs=("joint_positions",), kit="table"
-)
+@actuator("rod_velocity", RodVelocitySettings, RodVelocity, kit="table")
 class VelocityActuator(RodSetPoint):
     """Motors with speed controllers, as ideal ones: the speed is there as soon as the greatest force can bring it."""
 
     def __init__(self, settings: RodVelocitySettings, at: Mounting) -> None:
         limits = RodLimits(at)
-        super().__init__(at, limits.speeds)
-        self._forces = limits.forces
+        self._bounds, self._forces = limits.speeds, limits.forces
 
     def command(self, view: View) -> Motors:
         """Return (target speed, greatest force) of slide and spin, in SI units."""

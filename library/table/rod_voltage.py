@@ -23,15 +23,13 @@ class RodVoltages(Struct, frozen=True):
     spin: Volts
 
 
-@actuator(
-    "rod_voltage", RodVoltageSettings, RodVoltages, slots={"set_point": 2}, needs=("joint_positions",), kit="table"
-)
+@actuator("rod_voltage", RodVoltageSettings, RodVoltages, kit="table")
 class VoltageActuator(RodSetPoint):
     """Motors at the voltages of the last command; a dead time is the modifier `delay`."""
 
     def __init__(self, settings: RodVoltageSettings, at: Mounting) -> None:
         slide, spin = settings.slide, settings.spin
-        super().__init__(at, (slide.voltage, spin.voltage))
+        self._bounds = slide.voltage, spin.voltage
         self._emf = slide.back_emf, spin.back_emf
         along, around = settings.constants
         self._forces = along * slide.current, around * spin.current

@@ -120,5 +120,5 @@ def test_models_and_rules_say_what_a_world_shows(fleet_text: Callable[..., str])
     assert can == {"base": (True, False, False), **dict.fromkeys(("rover01", "rover02"), (True, False, True))}
     assert shown["marks"] == {
         "empty": {"look": "lost", "text": "empty batteries", "cut": False},
-        "failed": {"look": "lost", "text": "forms that failed", "cut": False},
+        "failed": {"look": "lost", "text": "components that failed", "cut": False},
     }

@@ -41,47 +41,48 @@ RULE: Final = "robots.red.goal.rules={own: {kind: 'own_form:OwnRule'}}"
 WORLD: Final = "rules={own: {kind: 'own_form:World'}}"
 TWO: Final = (
     "class OwnSensor(Sensor):",
+    "    SENSOR",
     "    def sample(self, view): return Number(0.0)",
-    "class OwnRule(EntityRule): pass",
+    "class OwnRule(EntityRule): RULE",
     "class World(Own): pass",
-    "sensor('own-sensor', Settings, Number, slots={SENSOR})(OwnSensor)",
-    "rule('own-rule', EntityRuleSettings, slots={RULE})(OwnRule)",
-    "rule('own-world', RuleSettings, each={WORLD})(World)",
+    "sensor('own-sensor', Settings, Number)(OwnSensor)",
+    "rule('own-rule', EntityRuleSettings)(OwnRule)",
+    "rule('own-world', RuleSettings, each=WORLD)(World)",
 )
 
 
 @pytest.mark.parametrize(
     ("sensor", "rule", "world", "told"),
     [
-        ("{'a': 1}", "{'b': 1}", "{ROBOTS: {'c': 1}}", []),
-        ("{'a': 1}", "{'a': 1}", "{}", [
+        ("a = slot()", "b = slot()", "{ROBOTS: {'c': 1}}", []),
+        ("a = slot()", "a = slot()", "{}", [
             "robots.red.goal.sensors: the sensor own declares the slot own.a of red.goal, which the rule own has "
             "already, 'a'"]),
-        ("{'a': 2}", "{}", "{ROBOTS: {'a': 1}}", [
+        ("a = slot(2)", "pass", "{ROBOTS: {'a': 1}}", [
             "robots.red.goal.sensors: the sensor own declares the slot own.a of red.goal, which the rule own of the "
             "world has already, 'a'"]),
-        ("{}", "{'a': 1}", "{'rod': {'a': 1}}", [
+        ("pass", "a = slot()", "{'rod': {'a': 1}}", [
             "robots.red.goal.rules: the rule own declares the slot own.a of red.goal, which the rule own of the world "
             "has already, 'a'"]),
-        ("{}", "{}", "{'camera': {'a': 1}, ROBOTS: {'a': 2}}", [
+        ("pass", "pass", "{'camera': {'a': 1}, ROBOTS: {'a': 2}}", [
             "rules: the rule own of the world declares the slot own.a of camera, which the rule own of the world has "
             "already, 'a'"]),
-        ("{}", "{}", "{ROBOTS: {'samples': 2}}", [
+        ("pass", "pass", "{ROBOTS: {'samples': 2}}", [
             "robots.red.goal.sensors: the sensor own declares the slot own.samples of red.goal, which the rule own of "
             "the world has already, 'samples'"]),
     ],
 )  # fmt: skip
 def test_a_slot_is_declared_once(site: Path, sensor: str, rule: str, world: str, told: list[str]) -> None:
     """Names of components may be equal where their slots are not."""
-    written(site, *(line.format(SENSOR=sensor, RULE=rule, WORLD=world) for line in TWO))
+    written(site, *(line.replace("SENSOR", sensor).replace("RULE", rule).replace("WORLD", world) for line in TWO))
     assert problems(SENSOR, RULE, WORLD) == told
 
 
 def test_modifiers_of_like_names_have_labels_of_their_own(site: Path) -> None:
     """A kind may be called as the second of another kind is."""
-    written(site, "modifier('delay2', ModifierSettings, slots={'values': 1})(Own)")
+    written(site, "class Two(Own): values = slot()", "modifier('delay2', ModifierSettings)(Two)")
     delay = "{kind: delay, time: 20 ms}"
-    text = apply_sets(TEXT, "t.yaml", [f"robots.camera.sensors.ball.modifiers=[{delay}, {{kind: 'own_form:Own'}}, "
+    text = apply_sets(TEXT, "t.yaml", [f"robots.camera.sensors.ball.modifiers=[{delay}, {{kind: 'own_form:Two'}}, "
                                        f"{delay}]"])  # fmt: skip
     counts = build_layout(load_deployment(text, "t.yaml"))["camera"].counts
     found = {slot: count for slot, count in counts.items() if slot.endswith(".values")}

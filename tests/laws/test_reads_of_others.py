@@ -31,19 +31,21 @@ from foosim.library.mobile.wheel_speeds import Drive, DriveActuator
 from msgspec import Struct
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.component_types.quantities import Metres
-from foosim.world.components.base import EntityRule, Sensor
+from foosim.world.components.base import EntityRule, Sensor, need, slot
 from foosim.world.component_types.registry import actuator, rule, sensor
 from foosim.world.component_types.settings import ActuatorSettings, EntityRuleSettings, SensorSettings
 
 
-@rule("follows", EntityRuleSettings, slots={"seen": 1, "set_point": 2, "near": 1})
+@rule("follows", EntityRuleSettings)
 class Follows(EntityRule):
+    seen, set_point, near = slot(), slot(2), slot()
+    own = need("position")
+
     def __init__(self, settings, at):
-        self.near, self.around = at.slot("near"), Surroundings(at.spec, at.layout)
+        self.around = Surroundings(at.spec, at.layout)
         rovers = at.layout.of("rover")
         other = rovers[(rovers.index(at.robot) + 1) % len(rovers)]
         self.others = [at.of(other, field) for field in ("position", "drive.set_point", "drive.asked")]
-        self.own, self.seen, self.set_point = at.slot("position"), at.slot("seen"), at.slot("set_point")
 
     def apply(self, view):
         position, set_point, asked = map(view.read, self.others)
@@ -57,23 +59,27 @@ class Near(Struct, frozen=True):
     x: Metres
 
 
-@sensor("neighbours", SensorSettings, Near, needs=("position",))
+@sensor("neighbours", SensorSettings, Near)
 class Neighbours(Sensor):
+    own = need("position")
+
     def __init__(self, settings, at):
-        self.own, self.around = at.slot("position"), Surroundings(at.spec, at.layout)
+        self.around = Surroundings(at.spec, at.layout)
 
     def sample(self, view):
         near = self.around.near(view, tuple(view.read(self.own)), 1.8, "vehicle")
         return Near(sum(self.around.position(view, entity)[0] for entity in near))
 
 
-@actuator("asks", ActuatorSettings, Drive, slots={"set_point": 2, "asked": 1}, needs=("wheel_speeds",), kit="hall")
+@actuator("asks", ActuatorSettings, Drive, needs=("wheel_speeds",), kit="hall")
 class Asks(DriveActuator):
+    asked = slot()
+
     def __init__(self, settings, at):
         super().__init__(settings, at)
         rovers = at.layout.of("rover")
         other = rovers[(rovers.index(at.robot) + 1) % len(rovers)]
-        self.asked, self.others = at.slot("asked"), at.of(other, "drive.set_point")
+        self.others = at.of(other, "drive.set_point")
 
     def accept(self, command, view):
         view.write(self.asked, view.read(self.others)[0] + view.count)

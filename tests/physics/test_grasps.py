@@ -285,7 +285,7 @@ def test_an_object_that_fits_is_taken_and_a_failed_job_has_the_reason(gripper: d
         job = jobs.call(closed=1.0)
         while not job.state.has_ended:
             jobs.hear(made.step(jobs.commands(made.tick)))
-        assert held(made) == ("" if why else "crate") and made.frame.at("a", "gripper.wanted") == 1.0
+        assert held(made) == ("" if why else "crate") and made.frame.at("a", "gripper.closed") == 1.0
         assert job.state == (JobState.FAILED if why else JobState.DONE)
         assert why in job.why and bool(why) == bool(job.why)
 

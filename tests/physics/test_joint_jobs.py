@@ -291,7 +291,7 @@ def test_what_an_eye_cannot_see_fails_its_job(its: Simulation) -> None:
     assert tell(its, "eye", value("look_at", 0.0, 5.0, 9.0, 1.0), 90) == JobState.RUNNING
     its.advance({}, 120)
     assert its.frame.at("eye", "go.jobs_states") == JobState.FAILED
-    assert its.frame.at("eye", "go.given") == 0.0
+    assert its.frame.at("eye", "go.has_target") == 0.0
 
 
 @pytest.mark.parametrize(

@@ -332,11 +332,10 @@ PARTS: Final = "".join(
 OWN_SPIN: Final = """
 from foosim.library.rigid.joint_velocity import JointVelocities, JointVelocityActuator, JointVelocitySettings
 from foosim.world.component_types.registry import actuator
-from foosim.library.rigid.joints import set_points
 
 class SpinSettings(JointVelocitySettings): pass
 
-@actuator("spin", SpinSettings, JointVelocities, slots=set_points, needs=("joint_positions",), joints="joints")
+@actuator("spin", SpinSettings, JointVelocities, joints="joints")
 class Spin(JointVelocityActuator):
     def __init__(self, settings, at):
         super().__init__(settings, at)

@@ -39,7 +39,7 @@ from foosim.world.components.entities import RuleMounting
 from foosim.world.components.view import Mounting
 from foosim.world.component_types.descriptions import ENTITY
 from foosim.world.component_types.quantities import Metres
-from foosim.world.components.base import EntityRule, Rule, Sensor
+from foosim.world.components.base import EntityRule, Rule, Sensor, need, slot
 from foosim.world.component_types.registry import rule, sensor
 from foosim.world.component_types.settings import RuleSettings, SensorSettings
 
@@ -53,10 +53,12 @@ class Settings(SensorSettings):
 """
 SENSOR: Final = """
 
-@sensor("own", Settings, Number, slots={{"kept": 1}}, needs=("joint_positions",))
+@sensor("own", Settings, Number)
 class Own(Sensor):
+    kept, joints = slot(), need("joint_positions")
+
     def __init__(self, settings, at):
-        self.at, self.kept, self.joints = at, at.slot("kept"), at.slot("joint_positions")
+        self.at = at
         self.count = 0
         self.random = random.Random(1)
 
@@ -71,10 +73,11 @@ class OwnSettings(RuleSettings):
     pass
 
 
-@rule("own", OwnSettings, slots={"sum": 16})
+@rule("own", OwnSettings)
 class Own(Rule):
+    sum = slot(16)
+
     def __init__(self, settings, at):
-        self.sum = at.slot("sum")
         self.joints = [at.of(rod, "joint_positions") for rod in at.layout.of("rod")]
         self.ball = at.of(at.layout["ball"], "position")
         self.index, self.robots = at.layout["ball"].index, list(at.spec.robots)
@@ -163,7 +166,7 @@ def test_an_entity_that_is_kept_as_a_number_is_found_beside_one_more(planted: Pa
     found = broken(planted, RULE.replace("APPLY", "view.write(self.sum, *[float(self.index)] * 16)"), OF_WORLD)
     (line,) = found
     assert line.startswith(BESIDE) and line.endswith("world own.sum")
-    declared = RULE.replace('slots={"sum": 16}', 'slots={"sum": ENTITY}')
+    declared = RULE.replace("slot(16)", "slot(ENTITY)")
     assert broken(planted, declared.replace("APPLY", "view.write(self.sum, float(self.index))"), OF_WORLD) == []
 
 
@@ -264,10 +267,9 @@ def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
 
 ALARMS: Final = """
 
-@sensor("own", Settings, Number, slots={"alarm": 1}, trigger="TRIGGER")
+@sensor("own", Settings, Number, trigger="TRIGGER")
 class Own(Sensor):
-    def __init__(self, settings, at):
-        self.alarm = at.slot("alarm")
+    alarm = slot()
 
     def sample(self, view):
         view.write(self.alarm, float(view.tick % 10 == 0))
@@ -278,10 +280,9 @@ class Alarming(EntityRuleSettings):
     pass
 
 
-@rule("own", Alarming, slots={"alarm": 1})
+@rule("own", Alarming)
 class Alarms(EntityRule):
-    def __init__(self, settings, at):
-        self.alarm = at.slot("alarm")
+    alarm = slot()
 
     def apply(self, view):
         view.write(self.alarm, float(view.tick % 7 == 0))

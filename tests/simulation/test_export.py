@@ -79,10 +79,9 @@ class Pull(Struct, frozen=True):
     several: tuple[float, ...]
 
 
-@actuator("own", ActuatorSettings, Pull, slots={"rate": 1}, needs=("joint_positions",))
+@actuator("own", ActuatorSettings, Pull, needs=("joint_positions",))
 class Actuator(Own):
-    def __init__(self, settings, at):
-        self._rate = at.slot("rate")
+    _rate = slot()
 
     def limits(self):
         return {}

@@ -134,7 +134,7 @@ def _array(numbers: list[float]) -> Any:
 def test_a_rotorcraft_without_power_brakes_and_hovers() -> None:
     craft = {"model": "rotorcraft", "at": {"z": "2 m"}, "rules": battery(capacity="10 J", drag="10 N", idle="0 W")}
     world = yard(cart=craft)
-    world.put("cart", "pilot.given", 1.0)
+    world.put("cart", "pilot.has_target", 1.0)
     world.put("cart", "pilot.target", 50.0, 0.0, 2.0, 0.0)
     world.step(600)
     assert charge(world) == 0.0

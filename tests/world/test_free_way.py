@@ -62,7 +62,7 @@ def command_all(yard: Yard) -> None:
             numbers = drawn(robot.name, yard.tick, bounds)
             if robot.model == "rotorcraft":
                 numbers[2] = 0.75 + drawn(f"{robot.name}z", yard.tick, (0.7,))[0]
-                yard.put(robot.name, "pilot.given", 1.0, *numbers)
+                yard.put(robot.name, "pilot.has_target", 1.0, *numbers)
             else:
                 yard.put(robot.name, "motion.set_point", *numbers)
 
@@ -144,7 +144,7 @@ def test_what_is_above_or_below_its_band_of_heights_is_not_in_the_way() -> None:
     yard = Yard(yard_text(robots, scene={"kind": "boxes", "boxes": {"beam": beam}}))
     for name in ("below", "tall"):
         yard.put(name, "motion.set_point", 1.0, 0.0)
-    yard.put("above", "pilot.given", 1.0, 4.0, 1.0, 0.56, 0.0)
+    yard.put("above", "pilot.has_target", 1.0, 4.0, 1.0, 0.56, 0.0)
     yard.step(500)
     assert yard.vector("below", "position")[0] > 4.0 and yard.vector("above", "position")[0] == pytest.approx(4.0)
     assert yard.vector("tall", "position")[0] == pytest.approx(1.25, abs=1e-3)
@@ -155,7 +155,7 @@ def test_a_rotorcraft_lands_on_a_box_and_on_another_one() -> None:
     robots = {"low": {"model": "rotorcraft", "at": {"z": "2 m"}}, "high": {"model": "rotorcraft", "at": {"z": "3 m"}}}
     yard = Yard(yard_text(robots, scene={"kind": "boxes", "boxes": {"box": box}}))
     for name in robots:
-        yard.put(name, "pilot.given", 1.0, 0.0, 0.0, 0.0, 0.0)
+        yard.put(name, "pilot.has_target", 1.0, 0.0, 0.0, 0.0, 0.0)
     yard.step(600)
     low, high = (yard.vector(name, "position")[2] for name in robots)
     top = 0.15 + 0.15 / 8
@@ -200,7 +200,7 @@ def test_it_stops_at_rigid_bodies_and_leaves_one_that_was_pushed_into_it() -> No
     yard = Yard(yaml.safe_dump(data))
     craft = (yard.layout["craft"],)
     ball = yard.vector("ball", "position")
-    yard.put("craft", "pilot.given", 1.0, 0.0, 0.0, 0.0, 0.0)
+    yard.put("craft", "pilot.has_target", 1.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(1500):
         yard.solve(craft, yard.numbers, yard.stepper)
     top = ball[2] * 2.0

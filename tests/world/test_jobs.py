@@ -99,7 +99,7 @@ def test_only_its_owner_cancels() -> None:
         tell(its, (ANN, 1.0))
         assert tell(its, (BEN, -1.0)) == [(1, RUNNING), (1, CANCELLED)]
         assert tell(its, (ANN, -1.0)) == [(1, CANCELLED), (1, CANCELLED)]
-        assert (running(its), its.frame.at("base", "go.given")) == (0, 0.0), "it stops"
+        assert (running(its), its.frame.at("base", "go.has_target")) == (0, 0.0), "it stops"
         assert tell(its, (ANN, -1.0), (ANN, 1.0)) == [(1, CANCELLED), (1, CANCELLED)]
 
 
@@ -109,7 +109,7 @@ def test_a_plain_command_is_no_job() -> None:
         assert tell(its, (BEN, 0.0)) == [(1, PREEMPTED), (0, NONE)]
         assert (running(its), target(its)) == (0, (10.0, 2.0))
         assert tell(its, (ANN, -1.0)) == [(1, PREEMPTED), (0, NONE)]
-        assert its.frame.at("base", "go.given") == 1.0, "it goes on"
+        assert its.frame.at("base", "go.has_target") == 1.0, "it goes on"
 
 
 def test_who_may_not_command_the_robot_gives_it_no_jobs() -> None:
@@ -169,7 +169,7 @@ def test_it_fails_when_the_robot_goes_out_of_service() -> None:
         assert tell(its) == [(1, FAILED), (0, NONE)]
         its.set("base", "down", False)
         assert tell(its, (ANN, 1.0)) == [(1, FAILED), (0, NONE)]
-        assert its.frame.at("base", "go.given") == 0.0
+        assert its.frame.at("base", "go.has_target") == 0.0
 
 
 def test_what_was_known_outlasts_a_robot_that_leaves_and_comes_back() -> None:

@@ -37,15 +37,11 @@ REFUSED: Final = {
     'sensor("own", Settings, Number, shown_as="foxglove.Pose")': "shown_as is one of foxglove.LaserScan, ",
     'sensor("own", Settings, Number, shown_as="foxglove.PoseInFrame")': "its reading Number lacks the numbers that ",
     'sensor("own", Settings, Scan, shown_as="foxglove.LaserScan")': "its settings Settings lack bearings, which ",
-    'sensor("own", Settings, Number, slots=("kept",))': "slots: they are a mapping of names to counts of numbers, not ",
-    'sensor("own", Settings, Number, slots={"a.b": 1})': f"slots: 'a.b': {NAME}",
-    'sensor("own", Settings, Number, slots={"kept": True})': "slots: kept has 1 to 65536 numbers, or ENTITY, not true",
-    'sensor("own", Settings, Number, slots={"a": 65536, "b": 1})': "slots: 65537 numbers in all, at most 65536 are ",
+    'sensor("own", Settings, Number, slots={"kept": 1})': "its slots are declared in its class, as offset = ",
     'modifier("own", ModifierSettings, per_field={"std": 0.0})': "per_field names no setting, 'std' (there are: kind)",
     'rule("own", RuleSettings, settable={"a": 1.0})': "settable: a is set to a Quantity, which has limits, not to ",
     f'model("own", RobotSettings, slots={{"at": 1}}, settable={{"at": {ONE}}})': "settable: at is set by foosim itself",
-    f'rule("own", RuleSettings, slots={{"a": 2}}, settable={{"a": {ONE}}})': "settable: a is no slot of one number, ",
-    'rule("own", RuleSettings, slots=lambda settings, on: {})': "slots: they are a mapping",
+    f'rule("own", RuleSettings, settable={{"a": {ONE}}})': "settable: a is no slot of one number, ",
     'rule("own", RuleSettings, each={"rod": {"a": 0}})': "each rod: a has 1 to 65536 numbers, or ENTITY, not 0",
     'model("own", RobotSettings, slots={"down": 2})': "down, which foosim writes, is one number, not 2",
     'model("own", RobotSettings, actuators={"drive": "wheel_speeds"})': "actuators: Expected `object`, got `str`",
@@ -84,34 +80,34 @@ def test_a_class_of_another_type_is_refused(site: Path, form: str) -> None:
 
 PLACE: Final = "robots.red.goal.sensors.own"
 SLOTS: Final = {
-    "lambda settings, on: {'kept': settings.count}": "",
-    "lambda settings, on: [settings.count]": "its slots are wrong: they are a mapping of names to counts of numbers, "
-    "not a list of 1, 'own'",
-    "lambda settings, on: {'kept': 100_000}": "its slots are wrong: kept has 1 to 65536 numbers, or ENTITY, not "
-    "100000, 'own'",
-    "lambda settings, on: {'samples': 1}": "its slots are wrong: each sensor has a slot samples already, 'own'",
-    "lambda settings, on: 1 // 0": "its slots failed: ZeroDivisionError: integer division or modulo by zero "
-    "(own_form.py:LINE), 'own'",
-    "lambda settings: {}": "its slots failed: TypeError: <lambda>() takes 1 positional argument but 2 were "
-    "given, 'own'",
-    "refuse": "more than can be kept, '3 s'",
+    "a = slot()": "",
+    "a = slot(lambda settings, carrier: settings.count)": "",
+    "a = slot(0)": "a has 1 to 65536 numbers, or ENTITY, not 0",
+    "a, b = slot(65_536), slot()": "65537 numbers in all, at most 65536 are valid",
+    "B = slot()": f"'B': {NAME}",
+    "samples = slot()": "each sensor has a slot samples already",
+    "a = slot(lambda settings, carrier: '1')": "slots are wrong: a has 1 to 65536 numbers, or ENTITY, not '1', 'own'",
+    "a = slot(lambda settings, carrier: 1 // 0)": "its slots failed: ZeroDivisionError: integer division or modulo by "
+    "zero (own_form.py:LINE), 'own'",
+    "a = slot(refuse)": "more than can be kept, '3 s'",
 }
+"""Declarations of a class, and their problem."""
 
 
 @pytest.mark.parametrize("slots", SLOTS)
-def test_slots_that_do_not_follow_from_settings_are_a_problem_of_the_component(site: Path, slots: str) -> None:
-    refuse = ("def refuse(settings, on):", "    raise BadValue('more than can be kept', '3 s')")
-    line = len(written(site, *refuse, f"sensor('own', Settings, Number, slots={slots})(Own)").read_text().splitlines())
-    told = SLOTS[slots].replace("LINE", str(line))
-    assert problems(f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: 7}}") == (
-        [f"{PLACE}: {told}"] if told else []
+def test_slots_are_checked_and_sizes_follow_from_settings(site: Path, slots: str) -> None:
+    refuse = ("def refuse(settings, carrier):", "    raise BadValue('more than can be kept', '3 s')")
+    lines = written(site, *refuse, "class Kept(Own):", f"    {slots}", "sensor('own', Settings, Number)(Kept)")
+    line = len(lines.read_text().splitlines()) - 1
+    sets, problem = (
+        [f"{PLACE}={{kind: 'own_form:Kept', rate: 100 Hz, count: 7}}"],
+        SLOTS[slots].replace("LINE", str(line)),
     )
-
-
-def test_a_sensor_whose_slots_follow_from_its_settings_has_them(site: Path) -> None:
-    written(site, "sensor('own', Settings, Number, slots=lambda settings, on: {'kept': settings.count})(Own)")
-    text = apply_sets(TEXT, "t.yaml", [f"{PLACE}={{kind: 'own_form:Own', rate: 100 Hz, count: 7}}"])
-    assert build_layout(load_deployment(text, "t.yaml"))["red.goal"].counts["own.kept"] == 7
+    found = problems(*sets)
+    assert (problem in found[0] and len(found) == 1) if problem else not found, found
+    if not problem:
+        counts = build_layout(load_deployment(apply_sets(TEXT, "t.yaml", sets), "t.yaml"))["red.goal"].counts
+        assert counts["own.a"] == (7 if "count" in slots else 1)
 
 
 def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:

@@ -78,7 +78,7 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator
+from foosim.world.components.base import Actuator, need, slot
 from foosim.world.component_types.registry import actuator
 
 
@@ -94,13 +94,15 @@ class Turn(Struct, frozen=True):
     rate: Annotated[float, Meta(extra={"unit": "rad/s"})]
 
 
-@actuator("winch", WinchSettings, Turn, slots={"rate": 1, "taken": 1}, needs=("joint_positions",))
+@actuator("winch", WinchSettings, Turn)
 class Winch(Actuator):
     """A rod's spin by its speed; it counts the commands that it took."""
 
+    _rate, _taken = slot(), slot()
+    _joints = need("joint_positions")
+
     def __init__(self, settings, at):
-        self._rate, self._taken, self._most = at.slot("rate"), at.slot("taken"), settings.most
-        self._joints = at.slot("joint_positions")
+        self._most = settings.most
 
     def limits(self):
         return {"rate": (-self._most, self._most)}

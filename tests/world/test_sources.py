@@ -26,6 +26,8 @@ FILES: Final = {
     "pack_own/forms/other.py": "",
     "pack_own/common.py": "near = 1\n",
     "pack_own/unused.py": "",
+    "space_own/one.py": "from space_own import two\nclass Form: pass\n",
+    "space_own/two.py": "",
 }
 
 
@@ -43,8 +45,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def forget() -> None:
     for module in [name for name in sys.modules if name.partition(".")[0].endswith("_own")]:
         del sys.modules[module]
-    for kept in (versions._spec, versions._source, versions._imports, versions._folder):
-        kept.cache_clear()
+    versions._version.cache_clear()
     invalidate_caches()
 
 
@@ -70,13 +71,17 @@ def test_of_a_package_what_is_imported_counts(folder: Path) -> None:
     assert list(found) == package
 
 
+def test_of_a_namespace_modules_count(folder: Path) -> None:
+    assert list(sources_of(made("space_own.one", "Form"))) == ["space_own.one", "space_own.two"]
+
+
 def test_what_is_compiled_counts_with_its_bytes(folder: Path) -> None:
     source = folder / "first_own.py"
     code = folder / "first_own.pyc"
     py_compile.compile(str(source), cfile=str(code), doraise=True)
     source.unlink()
     forget()
-    assert sources_of(made("first_own", "Form")) == {"first_own": code.read_bytes()}
+    assert sources_of(made("first_own", "Form"))["first_own"] == code.read_bytes()
 
 
 def test_in_a_library_only_the_same_package_counts(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,7 @@ from msgspec import Struct
 from foosim import Player
 from foosim.world.components.entities import RuleMounting
 from foosim.world.component_types.quantities import Metres
-from foosim.world.components.base import Actuator, EntityRule, Model, Modifier, Motion, Rule, Sensor
+from foosim.world.components.base import Actuator, EntityRule, Model, Modifier, Motion, Rule, Sensor, need, slot
 from foosim.world.component_types.registry import actuator, model, modifier, rule, scene, sensor
 from foosim.world.component_types.settings import (
     ActuatorSettings, EntityRuleSettings, ModifierSettings, RobotSettings, RuleSettings, SceneSettings, SensorSettings)
@@ -76,10 +76,9 @@ class Wanted(Struct, frozen=True):
     speed: Metres
 
 
-@actuator("speed", ActuatorSettings, Wanted, slots={"wanted": 1})
+@actuator("speed", ActuatorSettings, Wanted)
 class Speed(Actuator):
-    def __init__(self, settings, at):
-        self.wanted = at.slot("wanted")
+    wanted = slot()
 
     def accept(self, command, view):
         view.write(self.wanted, command.speed)
@@ -103,10 +102,12 @@ class Reading(Struct, frozen=True):
     y: Metres
 
 
-@sensor("places", SensorSettings, Reading, needs=("position",), slots={"count": 1})
+@sensor("places", SensorSettings, Reading)
 class Places(Sensor):
+    position, count = need(), slot()
+
     def __init__(self, settings, at):
-        self.position, self.count = at.slot("position"), at.slot("count")
+        self.left = at.slot("quarantined")
 
     def sample(self, view):
         view.write(self.count, view.read(self.count)[0] + 1.0)
@@ -122,19 +123,17 @@ class Halves(Modifier):
         return [value / 2.0 for value in values]
 
 
-@rule("wears", EntityRuleSettings, slots={"way": 1}, needs=("velocity",))
+@rule("wears", EntityRuleSettings)
 class Wears(EntityRule):
-    def __init__(self, settings, at):
-        self.way, self.velocity = at.slot("way"), at.slot("velocity")
+    way, velocity = slot(), need()
 
     def apply(self, view):
         view.write(self.way, view.read(self.way)[0] + abs(view.read(self.velocity)[0]))
 
 
-@rule("counts", RuleSettings, slots={"ticks": 1})
+@rule("counts", RuleSettings)
 class Counts(Rule):
-    def __init__(self, settings, at):
-        self.ticks = at.slot("ticks")
+    ticks = slot()
 
     def place(self, view):
         view.write(self.ticks, 5.0)
@@ -241,9 +240,9 @@ BROKEN: Final = {
         "abs(view.read(self.velocity)[0])",
         "float('nan')",
         "robots.mover.rules",
-        "nan for mover wears.way: numbers of a frame are finite (own_forms.py:",
+        "nan for mover wears.way: numbers of a frame are finite (own_components.py:",
     ),
-    "a slot that is none": ('at.slot("count")', 'at.slot("cuont")', "robots.mover.sensors:", "cuont"),
+    "a slot that is none": ('at.slot("quarantined")', 'at.slot("quarantind")', "robots.mover.sensors:", "quarantind"),
     "a reading of another type": (
         "Reading(*view",
         "tuple(view",

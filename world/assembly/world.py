@@ -41,7 +41,7 @@ NO_STATUS: Final = "no status of"
 NO_TEXT: Final = "no text of"
 FAILED: Final = "failed"
 """The kind of the mark of a rule whose own marks failed."""
-FAILED_LOOK: Final = MarkKind("lost", "forms that failed")
+FAILED_LOOK: Final = MarkKind("lost", "components that failed")
 EVENT: Final = "event"
 EVENT_LOOK: Final = MarkKind("away", "events of the world", is_cut=True)
 TOGETHER_MIN: Final = 32
@@ -218,10 +218,10 @@ def _marks_of(rule: Any, before: Frame, after: Frame) -> list[Marked]:
 
 
 class World:
-    """The computation of one layout's ticks, except the engine. Raises ComponentError for a form that raises."""
+    """The computation of one layout's ticks, except the engine. Raises ComponentError for a component that raises."""
 
     def __init__(self, spec: WorldSpec, layout: Layout, *, is_guarded: bool = False) -> None:
-        """`is_guarded`: forms that write to the frame otherwise than by their views are errors (`watching`)."""
+        """`is_guarded`: components that write to the frame otherwise than by their views are errors (`watching`)."""
         self._spec, self._layout = spec, layout
         self.models: dict[int, Model] = models_of(spec, layout)
         self._rules = rules_of(spec, layout)
@@ -277,7 +277,7 @@ class World:
         }
 
     def _guard(self) -> None:
-        """Give all forms read-only numbers of the frame."""
+        """Give all components read-only numbers of the frame."""
         self.models = {index: guarded(model) for index, model in self.models.items()}
         self._rules = {label: guarded(rule) for label, rule in self._rules.items()}
         self.actuators = {index: tuple(map(guarded_actuator, its)) for index, its in self.actuators.items()}

@@ -1,1 +1,1 @@
-"""What forms of the world have in common: their registry, their settings, the values that they exchange."""
+"""What component types have in common: their registry, descriptions, settings, and the values that they exchange."""

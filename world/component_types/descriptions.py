@@ -1,4 +1,4 @@
-"""Descriptions of registered forms: their settings, slots, needs and writes."""
+"""Descriptions of registered component types: their settings, slots, needs and writes."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def overrides(kind: Callable[..., Any], hook: str) -> bool:
 
 
 def word_of(form: str) -> str:
-    """Return the noun of a form."""
+    """Return the noun of a component."""
     return WORDS.get(form, form)
 
 
@@ -142,15 +142,16 @@ SET_BY_FOOSIM: Final = ("at", DOWN)
 OF_SOLVED: Final = ("quarantined",)
 """Fields of each solved entity: whether it keeps its last state, since its new one was invalid."""
 
-SlotsOf: TypeAlias = Callable[[Any, Carrier], Mapping[str, int]]
-"""The slots of a component, by its settings and its carrier. Raises BadValue for settings that do not fit that."""
+Size: TypeAlias = int | Callable[[Any, Carrier], int]
+"""The count of a slot's numbers, or a function of the settings and the carrier, which raises BadValue for settings that
+do not fit the carrier."""
 FieldsOf: TypeAlias = Callable[[Any, Any], Mapping[str, int]]
 """The fields of an entity's state, by its settings (None except of robots) and the world (`WorldSpec`) with its
 files. Raises BadValue for settings without valid fields."""
 
 
 def slots_found(name: str, slots_of: Callable[..., Any], *arguments: Any, is_sensor: bool = False) -> Mapping[str, int]:
-    """Return the slots that a function of a form returns. Raises BadValue where it fails, or returns invalid slots."""
+    """Return the slots that a function returns. Raises BadValue where it fails, or returns invalid slots."""
     try:
         found = slots_of(*arguments)
     except (BadValue, KeyboardInterrupt):
@@ -171,7 +172,7 @@ ArrayLengthOf: TypeAlias = Callable[[Any, Mapping[str, int]], int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComponentType:
-    """A registered class: its form and name, the class, and the model of its settings.
+    """A registered class: its type and name, the class, and the model of its settings.
 
     `kit` is the section that a deployment must have, empty where it fits any world.
     """
@@ -203,21 +204,22 @@ class Component(ComponentType):
     """A sensor, actuator or modifier.
 
     `value` is the type of its readings or commands; a modifier has none. `slots` are the numbers of its state, by
-    field: they are in the frame as `NAME.FIELD`, NAME being that of the component on its robot. `needs` are the fields
-    that the model of its robot must have. `array_length` is the setting with the count of numbers of a reading's last
-    fields, where these have several each, or a function that returns it.
+    field, as its class declares them: they are in the frame as `NAME.FIELD`, NAME being that of the component on its
+    robot. `needs` are the fields that the model of its robot must have: what its class declares, and others.
+    `array_length` is the setting with the count of numbers of a reading's last fields, where these have several each,
+    or a function that returns it.
     `moves`: an actuator commands the motors of its robot. `joints` is the setting that names their joints, in the order
     of the actuator's set-points; without such a setting, or with None, it commands all. No motor is commanded by two
-    actuators. `jobs`: its commands may be jobs (`component_types.jobs`).
+    actuators. `jobs`: its commands may be jobs (`jobs`).
     `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0; or a function that returns it, maybe a slot of an actuator.
-    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `component_types.shown`; empty for none.
-    `per_field` are the settings with a number for each field (`component_types.per_field`), and the least that is valid of each;
+    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `shown`; empty for none.
+    `per_field` are the settings with a number for each field (`per_field`), and the least that is valid of each;
     None without a least one.
     """
 
     value: type[Struct] | None = None
-    slots: Mapping[str, int] | SlotsOf = field(default_factory=dict)
+    slots: Mapping[str, Size] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     array_length: str | ArrayLengthOf = ""
     trigger: str | TriggerOf = ""
@@ -230,9 +232,11 @@ class Component(ComponentType):
     def slots_on(self, settings: Any, carrier: Carrier) -> Mapping[str, int]:
         """Return its slots with these settings. Raises BadValue where these do not fit its carrier, or give no valid
         slots."""
-        if not callable(self.slots):
-            return self.slots
-        return slots_found(self.name, self.slots, settings, carrier, is_sensor=self.type_name == "sensor")
+
+        def found() -> Mapping[str, int]:
+            return {name: size(settings, carrier) if callable(size) else size for name, size in self.slots.items()}
+
+        return slots_found(self.name, found, is_sensor=self.type_name == "sensor")
 
     def trigger_by(self, settings: Any) -> str:
         """Return the trigger of a sensor with these settings beside its rate; empty without one."""
@@ -331,7 +335,8 @@ class Model(ComponentType):
 class WorldRule(ComponentType):
     """A change of the world by itself, before a tick is solved.
 
-    `slots` are its state, as `NAME.FIELD` of the entity `world`, NAME being that of the rule in its world; `each` are
+    `slots` are its state, as its class declares it, as `NAME.FIELD` of the entity `world`, NAME being that of the rule
+    in its world; `each` are
     its state of the entities of a model (`ROBOTS`: of all robots), as `NAME.FIELD`. `writes` are the models whose state
     it may change. `settable` are its fields that can be set, as of a rule of entities (`EntityRule`).
     """
@@ -346,8 +351,9 @@ class WorldRule(ComponentType):
 class EntityRule(ComponentType):
     """A change of an entity by itself, after it was solved, computed by the node that solves it.
 
-    `slots` are its state, as `NAME.FIELD`; `needs` are the fields of the entity that it reads, `writes` the fields that
-    it changes. `shared` are slots that a model may have as fields of these names: of such a model it writes them.
+    `slots` are its state, as `NAME.FIELD`; `needs` are the fields of the entity that it reads: its class declares both.
+    `writes` are the fields that it changes. `shared` are slots that a model may have as fields of these names: of such
+    a model it writes them.
     `settable` are fields that can be set during a run, and the limits: slots of its own with one number; or the numbers
     by slot that its method `set(field, value)` returns. Values are in SI units.
     """

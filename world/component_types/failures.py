@@ -18,7 +18,7 @@ VALUE_LENGTH_MAX: Final = 80
 
 
 class ContractError(Exception):
-    """A method of a form has returned an invalid value; `method` has the place to change."""
+    """A method of a component has returned an invalid value; `method` has the place to change."""
 
     def __init__(self, method: Callable[..., Any], needed: str, given: object) -> None:
         name = getattr(method, "__name__", type(method).__name__)

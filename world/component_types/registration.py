@@ -116,12 +116,14 @@ def _values(found: Any) -> Iterator[str]:
 
 
 def _slots(found: Any, key: str, slots: Any) -> Iterator[str]:
-    if callable(slots) and found.type_name in ("model", "sensor", "actuator", "modifier"):
+    if callable(slots) and found.type_name == "model":
         return
+    if key == "slots" and isinstance(found, descriptions.Component):
+        slots = {name: 1 if callable(size) else size for name, size in slots.items()}
     problem = slots_problem(slots, is_sensor=found.type_name == "sensor")
     if problem:
         yield f"{key}: {problem}"
-    for slot in (*OF_ROBOTS, *OF_SOLVED) if isinstance(found, forms.Model) else ():
+    for slot in (*OF_ROBOTS, *OF_SOLVED) if isinstance(found, descriptions.Model) else ():
         if slots.get(slot, 1) != 1:
             yield f"{slot}, which foosim writes, is one number, not {show(slots[slot])}"
 
@@ -146,7 +148,7 @@ def _settable(found: Any) -> Iterator[str]:
     for name, quantity in getattr(found, "settable", {}).items():
         if not isinstance(quantity, Quantity):
             yield f"settable: {name} is set to a Quantity, which has limits, not to {_shown(quantity)}"
-        elif isinstance(found, forms.Model) and name in SET_BY_FOOSIM:
+        elif isinstance(found, descriptions.Model) and name in SET_BY_FOOSIM:
             yield f"settable: {name} is set by foosim itself"
         elif not overrides(found.factory, "set") and not callable(found.slots) and found.slots.get(name) != 1:
             yield f"settable: {name} is no slot of one number, and the class has no method set"

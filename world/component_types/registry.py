@@ -1,9 +1,9 @@
-"""The registry of forms: models, sensors, rules and all other parts of a world, by form and name.
+"""The registry of component types: models, sensors, rules and all other parts of a world, by type and name.
 
 Each is in a file of its own and registers itself there, under its name in deployments. One of foosim's own is in the
 folder of its form, or in a folder of that, in a module of its name; one of another package is in a module that the
 package names as an entry point of the group `foosim.world`; and `module:Class` names one of any module on the path.
-A module is imported when one of its forms is looked up.
+A module is imported when one of its component types is looked up.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LIBRARY: Final = "foosim.library"
 """Where foosim's own are: each in a module of its name, in a folder for the kind of world."""
 FORMS: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit")
 BY_CLASS: Final = "module:Class"
-"""The notation of a form by its class, beside its name."""
+"""The notation of a component type by its class, beside its name."""
 
 Made = TypeVar("Made", bound=Callable[..., Any])
 
@@ -66,12 +66,12 @@ _loaded: Final[dict[str, str]] = {}
 
 
 def sensor(name: str, settings: type[ComponentSettings], reading: type[Struct], **about: Any) -> Decorator:
-    """Register a sensor: a class derived from `components.base.Sensor`; `about` are fields of `descriptions.Component`."""
+    """Register a sensor: a class derived from `Sensor`; `about` are fields of `descriptions.Component`."""
     return _registering(Component, "sensor", name, settings, value=reading, **about)
 
 
 def actuator(name: str, settings: type[ComponentSettings], command: type[Struct], **about: Any) -> Decorator:
-    """Register an actuator: a class derived from `components.base.Actuator`; `about` are fields of `descriptions.Component`.
+    """Register an actuator: a class derived from `Actuator`; `about` are fields of `descriptions.Component`.
 
     It commands motors of its robot unless `moves` is False.
     """
@@ -79,12 +79,12 @@ def actuator(name: str, settings: type[ComponentSettings], command: type[Struct]
 
 
 def modifier(name: str, settings: type[ComponentSettings], **about: Any) -> Decorator:
-    """Register a modifier: a class derived from `components.base.Modifier`; `about` are fields of `descriptions.Component`."""
+    """Register a modifier: a class derived from `Modifier`; `about` are fields of `descriptions.Component`."""
     return _registering(Component, "modifier", name, settings, **about)
 
 
 def model(name: str, settings: type[EntitySettings], **about: Any) -> Decorator:
-    """Register a model: a class derived from `components.base.Model`; `about` are fields of `descriptions.Model`.
+    """Register a model: a class derived from `Model`; `about` are fields of `descriptions.Model`.
 
     Fields that foosim itself needs come after the declared ones. `variants` are
     classes of the same module by the value of the setting `dynamics`, each with the fields that differ:
@@ -94,7 +94,7 @@ def model(name: str, settings: type[EntitySettings], **about: Any) -> Decorator:
 
 
 def rule(name: str, settings: type[ComponentSettings], **about: Any) -> Decorator:
-    """Register a rule: a class derived from `components.base.Rule`, or from `EntityRule`; `about` are fields of
+    """Register a rule: a class derived from `Rule`, or from `EntityRule`; `about` are fields of
     `descriptions.WorldRule` or `descriptions.EntityRule`."""
 
     def register(made: Made) -> Made:
@@ -111,13 +111,17 @@ def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Dec
 
 
 def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
-    """Register a kit: a class derived from `components.base.Kit`; `about` are fields of `descriptions.Kit`."""
+    """Register a kit: a class derived from `Kit`; `about` are fields of `descriptions.Kit`."""
     return _registering(Kit, "kit", name, settings, **about)
 
 
 def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **about: Any) -> Decorator:
     def register(made: Made) -> Made:
-        found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **about})
+        if "slots" in about and form != "model":
+            what = "its slots are declared in its class, as offset = slot(3), not by slots="
+            raise Refused(f"{word_of(form)} {name} of {made.__module__}: {what}")
+        its = about | _declared(made, about)
+        found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **its})
         check_form(found)
         key = form, name
         if found.module != _own_modules().get(name):
@@ -131,8 +135,19 @@ def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **a
     return register
 
 
+def _declared(made: Any, about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the slots and needs that a class declares by `slot` and `need`, as fields of its description."""
+    declared = getattr(made, "declared", {}).values()
+    slots = {one.name: one.size for one in declared if one.size is not None}
+    shared = tuple(one.name for one in declared if one.is_shared)
+    found: dict[str, Any] = {key: its for key, its in (("slots", slots), ("shared", shared)) if its}
+    if needs := tuple(one.name for one in declared if one.size is None):
+        found["needs"] = (*needs, *about.get("needs", ()))
+    return found
+
+
 def _described(kind: type[Any], about: dict[str, Any]) -> Any:
-    """Return the description of a form; that of a model has the fields that foosim needs, and variants."""
+    """Return the description of a component type; that of a model has the fields that foosim needs, and variants."""
     variants = about.pop("variants", {})
     found = kind(**about)
     if not isinstance(found, Model):
@@ -148,7 +163,7 @@ def _described(kind: type[Any], about: dict[str, Any]) -> Any:
 
 
 def find(form: str, kind: str) -> ComponentType:
-    """Return the form with this `kind` in a deployment: a registered name, or `module:Class`.
+    """Return the component type with this `kind` in a deployment: a registered name, or `module:Class`.
 
     Raises UnknownName, which has the nearest name, and BadValue for a module that cannot be imported, or an
     unregistered class in it.
@@ -166,7 +181,7 @@ def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
 
 
 def lookup(form: str, kind: str) -> ComponentType | None:
-    """Return the form as `find`, or None for an unknown name; raises BadValue for a class as `find` does."""
+    """Return the component type as `find`, or None for an unknown name; raises BadValue for a class as `find` does."""
     if ":" in kind:
         return _of_class(form, kind)
     found = _known.get((form, kind)) or _own(form, kind)
@@ -266,7 +281,7 @@ def _own_modules() -> Mapping[str, str]:
 
 
 def class_at(path: str) -> Any:
-    """Return the value of `module:Class`, for a form or a player.
+    """Return the value of `module:Class`, for a component or a player.
 
     Raises BadValue for a module that cannot be imported, or has no such name; its nearest is a path that may be meant.
     """
@@ -308,7 +323,7 @@ def _not_found(path: str, missing: str) -> BadValue:
 
 
 def _of_class(form: str, path: str) -> ComponentType:
-    """Return the form that `module:Class` registered."""
+    """Return the component type that `module:Class` registered."""
     made, module = class_at(path), path.partition(":")[0]
     of_form = [one for one in _known.values() if one.type_name == form]
     for one in of_form:
@@ -320,7 +335,7 @@ def _of_class(form: str, path: str) -> ComponentType:
 
 
 def _forget_new(known: Mapping[tuple[str, str], ComponentType]) -> None:
-    """Forget the registered forms of modules whose import then failed; their earlier imports stay."""
+    """Forget the registered component types of modules whose import then failed; their earlier imports stay."""
     for key in _known.keys() - known.keys():
         if _known[key].module not in sys.modules:
             del _known[key]

@@ -1,4 +1,4 @@
-"""The common settings of all forms in a deployment."""
+"""The common settings of all component types in a deployment."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -114,4 +114,4 @@ BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
         "model": EntitySettings,
     }
 )
-"""The base class of the settings of a form; settings of kits are any."""
+"""The base class of the settings of a component type; settings of kits are any."""

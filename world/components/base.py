@@ -1,22 +1,24 @@
 """The base classes of components: what foosim calls of each, as hooks that are empty by default.
 
-A component derives from the class of its type, is registered by the decorator of that name (`world/component_types/registry.py`)
-and overrides what it needs. It gets its settings and its mounting, and is a pure function of the frame, its settings
-and keyed draws: its state is in slots, and its object keeps only what follows from deployment and layout.
+A component derives from the class of its type, is registered by the decorator of that name
+(`world/component_types/registry.py`) and overrides what it needs. It gets its settings and its mounting, and is a pure
+function of the frame, its settings and keyed draws: its state is in slots, which its class declares, and its object
+keeps only what follows from deployment and layout.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from foosim.world.component_types.jobs import JobState
 
 if TYPE_CHECKING:
     from foosim.common.finding import Finding
+    from foosim.world.component_types.descriptions import Size
     from foosim.world.components.entities import Marked, MarkKind, Motors
     from foosim.world.components.reach import Reach
-    from foosim.world.components.view import View, WritableView
+    from foosim.world.components.view import Mounting, Slot, View, WritableView
     from foosim.world.frame import Frame
     from foosim.world.layout import Entity, Layout
     from foosim.world.matter.physics import Physics
@@ -25,10 +27,47 @@ if TYPE_CHECKING:
     Limits = Mapping[str, tuple[float, float]]
 
 
+class Declared:
+    """A slot that a class of components declares, or a field of the robot's model that it needs."""
+
+    def __init__(self, size: Size | None, name: str = "", *, is_shared: bool = False) -> None:
+        self.size, self.name, self.is_shared = size, name, is_shared
+
+    def __set_name__(self, owner: type[Any], attribute: str) -> None:
+        self.name = self.name or attribute.lstrip("_")
+
+
+def slot(size: Size = 1, *, shared: bool = False) -> Slot:
+    """Declare a slot at the class of a component: with `target = slot(3)`, `self.target` is the slot `target`.
+
+    The name of the slot is that of the attribute, without `_` before it. `ENTITY` in place of a size is a reference to
+    an entity. A rule of an entity writes the model's field of that name instead where there is one, if it is `shared`.
+    """
+    return cast("Slot", Declared(size, is_shared=shared))
+
+
+def need(name: str = "") -> Slot:
+    """Declare at the class of a component that it needs a field of the robot's model, by default that of the
+    attribute's name: with `heading = need()`, `self.heading` is that field."""
+    return cast("Slot", Declared(None, name))
+
+
 class Component:
-    """What sensors, actuators, modifiers and rules of entities have in common."""
+    """What sensors, actuators, modifiers and rules have in common."""
 
     type_name: ClassVar[str] = ""
+    declared: ClassVar[Mapping[str, Declared]] = {}
+    """The slots and needs of the class, by attribute."""
+
+    def __init_subclass__(cls) -> None:
+        of_classes = [one for kind in reversed(cls.__mro__) for one in vars(kind).items()]
+        cls.declared = {attribute: one for attribute, one in of_classes if isinstance(one, Declared)}
+
+    def __new__(cls, settings: Any, at: Any, *more: Any) -> Self:
+        made = super().__new__(cls)
+        for attribute, one in cls.declared.items():
+            setattr(made, attribute, at.slot(one.name))
+        return made
 
     def __init__(self, settings: Any, at: Any) -> None:
         """`at` is the mounting; the settings of an entity of a kit are None."""
@@ -37,7 +76,7 @@ class Component:
     def check(settings: Any, at: Any) -> None:
         """Raise IncompatibleComponent where the settings do not fit the robot or the world; `at` is the mounting.
 
-        A modifier gets its numbers in place of a mounting (`component_types.per_field.Numbers`), and raises
+        A modifier gets its numbers in place of a mounting (`per_field.Numbers`), and raises
         BadValue.
         """
 
@@ -152,6 +191,9 @@ class Model(Component):
     type_name = "model"
     is_upright: bool = True
     """Whether obstacles meet an entity that moves by kinematics as a cylinder (`upright`) instead of its shapes."""
+
+    def __init__(self, settings: Any, at: Mounting) -> None:
+        self.settings, self.at = settings, at
 
     def body(self) -> Body | None:
         """Return its links and shapes; None without a body."""

@@ -1,4 +1,4 @@
-"""The fires of a world, as forms see them: the place and the radius of each burning one."""
+"""The fires of a world, as components see them: the place and the radius of each burning one."""
 
 from __future__ import annotations
 

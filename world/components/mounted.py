@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common.names import nearest_quoted
+from foosim.world.components.base import Sensor
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import IncompatibleComponent, Mounting
@@ -73,6 +74,18 @@ class Mounted:
         if self._body.is_free and missing:
             what = f"{self.entity.name} moves freely, and its state has no {', '.join(missing)}"
             raise IncompatibleComponent(("kind",), what, self.entity.model)
+
+
+class MountedSensor(Sensor):
+    """A sensor at a place on a robot: its setting `at`."""
+
+    def __init__(self, settings: Any, at: Mounting) -> None:
+        self.mount = Mounted(at, settings.at)
+
+    @staticmethod
+    def check(settings: Any, at: Mounting) -> None:
+        """Raise IncompatibleComponent for a link that the robot does not have."""
+        Mounted(at, settings.at)
 
 
 class MountedTogether(Rows):

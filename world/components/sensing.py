@@ -72,7 +72,7 @@ def _keep(plans: dict[tuple[BoundSensor, ...], Plan], key: tuple[BoundSensor, ..
 @dataclass(frozen=True, slots=True)
 class _Group:
     """Sensors or modifiers of one class that are computed together: the places of their sensors, themselves, their
-    `together` object, the count of numbers of each, their form and names, for messages, and whether their numbers are
+    `together` object, the count of numbers of each, their type and names, for messages, and whether their numbers are
     sent as they are."""
 
     places: list[int]

@@ -28,7 +28,7 @@ class Contacts(NamedTuple):
 
 
 class Surroundings:
-    """The entities of one layout, as forms see them: a form builds it from its mounting.
+    """The entities of one layout, as components see them: a component builds it from its mounting.
 
     Places are those at the start of the tick, the same in all nodes. It keeps only data of deployment and layout.
     """
@@ -83,7 +83,7 @@ class Surroundings:
 
     @property
     def caster(self) -> Caster:
-        """The ray caster of the layout, which all forms of it share."""
+        """The ray caster of the layout, which all components of it share."""
         found = self._layout.shared("caster", self._spec, self._made_caster)
         assert isinstance(found, Caster)
         return found

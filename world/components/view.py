@@ -27,7 +27,7 @@ Result = TypeVar("Result")
 
 
 class ComponentError(Failed):
-    """A form has raised, or returned an invalid value: each node that computes its tick would fail as it did.
+    """A component has raised, or returned an invalid value: each node that computes its tick would fail as it did.
 
     `component` is its name on `entity`, `cause` has its traceback.
     """
@@ -46,14 +46,14 @@ class IncompatibleComponent(BadValue):
 
 
 def called_of(component: str, entity: str) -> str:
-    """Return the component and its entity in words; `entity` is empty, or that of the world, for other forms."""
+    """Return the component and its entity in words; `entity` is empty, or that of the world, for other components."""
     return component + {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
 
 
 def component_error(component: str, entity: str, tick: int, error: BaseException) -> ComponentError:
-    """Return the ComponentError of a call of a form, for each exception: SystemExit, too.
+    """Return the ComponentError of a call of a component, for each exception: SystemExit, too.
 
-    An interrupt, and an error that names its form already, is raised as it is.
+    An interrupt, and an error that names its component already, is raised as it is.
     """
     if isinstance(error, KeyboardInterrupt | ComponentError):
         raise error
@@ -61,7 +61,7 @@ def component_error(component: str, entity: str, tick: int, error: BaseException
 
 
 def called(component: str, entity: str, tick: int, call: Callable[..., Result], *arguments: Any) -> Result:
-    """Return the value of a call of a form. Raises ComponentError."""
+    """Return the value of a call of a component. Raises ComponentError."""
     try:
         return call(*arguments)
     except BaseException as error:

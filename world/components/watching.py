@@ -1,6 +1,6 @@
 """Guarded forms: a line of theirs that changes a number of the frame without `view.write` raises.
 
-Checks of components and trials use guards; a run does not, since a guard costs more than most forms.
+Checks of components and trials use guards; a run does not, since a guard costs more than most components.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class _Seen(Sequence[float]):
 
 
 class WriteGuard:
-    """A form whose calls get their numbers read-only."""
+    """A component whose calls get their numbers read-only."""
 
     def __init__(self, made: Any) -> None:
         self._made = made
@@ -73,7 +73,7 @@ class WriteGuard:
 
 
 def guarded(made: Any) -> Any:
-    """Return a form with a guard; typed Any, since it has the methods of the form."""
+    """Return a component with a guard; typed Any, since it has the methods of the component."""
     return WriteGuard(made)
 
 
