@@ -240,7 +240,7 @@ BROKEN: Final = {
         "abs(view.read(self.velocity)[0])",
         "float('nan')",
         "robots.mover.rules",
-        "nan for mover wears.way: numbers of a frame are finite (own_components.py:",
+        "nan for mover wears.way: numbers of a frame are finite (own_forms.py:",
     ),
     "a slot that is none": ('at.slot("quarantined")', 'at.slot("quarantind")', "robots.mover.sensors:", "quarantind"),
     "a reading of another type": (
