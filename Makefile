@@ -17,7 +17,7 @@ export PYTHONDONTWRITEBYTECODE :=
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers forms machines lint page pictures bench compiled clean environment
+.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components machines lint page pictures bench compiled clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim up)'
@@ -30,7 +30,7 @@ help:
 	@echo 'make fuzz    hostile bytes on every channel and in every file (N=200000 each; SEED=17; ARGS: -k NAME)'
 	@echo 'make stats   the links against their laws, at full size, by a seed that it prints (SEED=n repeats one)'
 	@echo 'make numbers the bits and errors of elementary functions, the statistics of noise, over millions of values'
-	@echo 'make forms   each form in a world of its own: the laws, by several seeds, and settings at their limits'
+	@echo 'make components   each component type in a world of its own: the laws, by several seeds, and settings at their limits'
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/how-to/testing.md'
 	@echo 'make lint    ruff and mypy alone'
@@ -74,8 +74,8 @@ stats: environment
 numbers: environment
 	@$(PYTEST) -o timeout=0 -m campaign tests/common $(ARGS)
 
-forms: environment
-	@$(PYTEST) -o timeout=0 -m campaign tests/forms $(ARGS)
+components: environment
+	@$(PYTEST) -o timeout=0 -m campaign tests/components $(ARGS)
 
 swarm-gate: environment
 	@$(PYTHON) -m tests.gate.search $(ARGS)

@@ -86,7 +86,7 @@ def check_component(
 
 @app.command()
 def components(
-    form: Annotated[
+    type_name: Annotated[
         str | None, typer.Argument(metavar="TYPE", help="model, sensor, rule, kit or another type.")
     ] = None,
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="One of them, or module:Class.")] = None,
@@ -101,7 +101,7 @@ def components(
     from foosim.cli.components import as_json, chosen, line, lines
 
     with redirect_stdout(sys.stderr):  # what modules print is no result
-        found = chosen(form, name)
+        found = chosen(type_name, name)
     if json:
         print_json({"components": [as_json(component) for component in found]})
         return

@@ -1,4 +1,4 @@
-"""What `foosim components` shows: the forms that a deployment can name here."""
+"""What `foosim components` shows: the component types that a deployment can name here."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from foosim.world.component_types import registry
 from foosim.world.component_types.descriptions import ROBOTS, Component, ComponentType, Model, References
 from foosim.world.component_types.payloads import PayloadCodec
 from foosim.world.component_types.registration import VALUES
-from foosim.world.component_types.registry import FORMS
+from foosim.world.component_types.registry import TYPE_NAMES
 from foosim.world.component_types.settings import ActuatorSettings, EntityRuleSettings, ModifierSettings, SensorSettings
 from foosim.world.placing import is_placed
 from foosim.world.setting.settable import valid
 
-OF_FORM: Final[Mapping[str, tuple[str, ...]]] = {
+OF_TYPE: Final[Mapping[str, tuple[str, ...]]] = {
     "model": ("is_robot", "mover", "actuators", "rules", "tags"),
     "rule": ("each", "writes"),
     "entity_rule": ("writes", "shared"),
     "kit": ("entities", "rules", "presets"),
 }
-"""The fields to print of a form, besides those of all forms."""
+"""The fields to print of a component type, besides those of all."""
 SETTINGS_OF: Final[Mapping[str, str]] = {
     SensorSettings.__name__: "sensor",
     ActuatorSettings.__name__: "actuator",
     ModifierSettings.__name__: "modifier",
     EntityRuleSettings.__name__: "entity_rule",
 }
-"""Settings that are those of any component of a form."""
+"""Settings that are those of any component of a type name."""
 BOUNDS: Final[Mapping[str, str]] = {
     "minimum": "at least",
     "exclusiveMinimum": "more than",
@@ -37,17 +37,21 @@ BOUNDS: Final[Mapping[str, str]] = {
 }
 
 
-def chosen(form: str | None, name: str | None) -> list[ComponentType]:
-    """Return the forms of a kind and name, or all of them. Raises UnknownName."""
-    if form is not None and form not in FORMS:
-        named = [one for one in FORMS if registry.lookup(one, form) is not None] if ":" not in form else []
-        raise UnknownName(
-            "; ".join(["unknown component type", *(f"is it {one} {form}?" for one in named)]), form, FORMS
+def chosen(type_name: str | None, name: str | None) -> list[ComponentType]:
+    """Return the component types of a type name and name, or all of them. Raises UnknownName."""
+    if type_name is not None and type_name not in TYPE_NAMES:
+        named = (
+            [one for one in TYPE_NAMES if registry.lookup(one, type_name) is not None] if ":" not in type_name else []
         )
-    forms = FORMS if form is None else (form,)
+        raise UnknownName(
+            "; ".join(["unknown component type", *(f"is it {one} {type_name}?" for one in named)]),
+            type_name,
+            TYPE_NAMES,
+        )
+    type_names = TYPE_NAMES if type_name is None else (type_name,)
     if name is None:
-        return [registry.find(one, kind) for one in forms for kind in registry.names(one)]
-    return [registry.find(one, name) for one in forms]
+        return [registry.find(one, kind) for one in type_names for kind in registry.names(one)]
+    return [registry.find(one, name) for one in type_names]
 
 
 def as_json(component: ComponentType) -> dict[str, Any]:
@@ -62,7 +66,7 @@ def as_json(component: ComponentType) -> dict[str, Any]:
         "slots": None if callable(slots) else {field: _size(size) for field, size in slots.items()},
         "needs": list(getattr(component, "needs", ())),
         "kit": component.kit,
-        **{key: _plain(getattr(component, key)) for key in OF_FORM.get(component.type_name, ())},
+        **{key: _plain(getattr(component, key)) for key in OF_TYPE.get(component.type_name, ())},
         "settable": _settable(component),
     }
     if isinstance(component, Model) and component.variants:
@@ -132,7 +136,7 @@ def lines(component: ComponentType) -> Iterator[str]:
 
 
 def _lines_of_form(about: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a form's own fields; empty fields have none."""
+    """Yield the lines of a component type's own fields; empty fields have none."""
     for whose, slots in about.get("each", {}).items():
         yield f"  slots of each {'robot' if whose == ROBOTS else whose}: {_counted(slots)}"
     if about.get("writes"):
@@ -222,7 +226,9 @@ def _valid(value: Mapping[str, Any]) -> str:
         return " or ".join(map(str, value["enum"]))
     for inner, how in ((_inner(value), "by name"), (value.get("items"), "a list")):
         if isinstance(inner, dict) and inner:
-            form = SETTINGS_OF.get(inner.get("$ref", "").rpartition("/")[2])
-            return f"{how}: of {form}s, see components {form}" if form else f"{how}, each: {_valid(inner)}"
+            type_name = SETTINGS_OF.get(inner.get("$ref", "").rpartition("/")[2])
+            return (
+                f"{how}: of {type_name}s, see components {type_name}" if type_name else f"{how}, each: {_valid(inner)}"
+            )
     bounds = [f"{word} {value[key]}" for key, word in BOUNDS.items() if key in value]
     return ", ".join([str(value.get("type", "any")), *bounds])

@@ -28,7 +28,7 @@ from foosim.launcher.plan import Plan, check_models_here, check_players_here, ch
 from foosim.launcher.run_options import RunOptions
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.simulation.attendant import Interrupts
-from foosim.simulation.check.component_check import ComponentCheck, used_form
+from foosim.simulation.check.component_check import ComponentCheck, used_component_type
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.vhub.links.summary import summaries
@@ -148,9 +148,9 @@ LAST_LINES: Final = 10
 
 
 def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> int:
-    """Check a form in a deployment that uses it, and print what was found; return the exit code."""
-    form = used_form(text, str(file), name)
-    label, folder = f"{form.type_name} {form.name}", file.parent
+    """Check a component in a deployment that uses it, and print what was found; return the exit code."""
+    component_type = used_component_type(text, str(file), name)
+    label, folder = f"{component_type.type_name} {component_type.name}", file.parent
     text, files = pin_assets(text, str(file), folder)
     check = ComponentCheck(text, str(file), ticks, seed, files, partial(rehearse, folder=folder))
     shows, is_broken = sys.stderr.isatty(), False

@@ -10,10 +10,10 @@ PROTOCOL_VERSION: Final = 4
 
 NAME_LENGTH_MAX: Final = 32
 ENTITIES_MAX: Final = 4096
-FORMS_MAX: Final = 256
+COMPONENTS_MAX: Final = 256
 """Forms of a world from other packages."""
-FORM_NAME_MAX: Final = 400
-"""Characters of a form with its module and class, and of its version."""
+COMPONENT_NAME_MAX: Final = 400
+"""Characters of a component with its module and class, and of its version."""
 NODES_MAX: Final = 256
 CLIENTS_MAX: Final = 1024
 OPERATORS_MAX: Final = 64

@@ -20,7 +20,7 @@ from foosim.world.spec import KITS
 
 ROBOTS: Final = "robots"
 SECTIONS: Final[Mapping[str, str]] = {"sensors": "sensor", "actuators": "actuator", "rules": "entity_rule"}
-"""The sections of a robot that have components, and their form."""
+"""The sections of a robot that have components, and the type name of these."""
 OF_MODEL: Final = ("actuators", "rules")
 """The sections that a robot without them has from its model."""
 
@@ -60,12 +60,12 @@ class _Reader:
     def __init__(self) -> None:
         self.findings: list[Finding] = []
         self._read: dict[tuple[str, int], Any] = {}
-        """What was read without findings: by form and the identity of its plain data, which lives as long."""
+        """What was read without findings: by type name and the identity of its plain data, which lives as long."""
 
-    def find(self, form: str, kind: str, location: Location) -> Any:
+    def find(self, type_name: str, kind: str, location: Location) -> Any:
         """Return a component type; None, reported, where there is none."""
         try:
-            return registry.find(form, kind)
+            return registry.find(type_name, kind)
         except BadValue as error:
             self.findings.append(Finding(location, error.problem, kind, error.nearest))
         return None
@@ -78,12 +78,12 @@ class _Reader:
             self.findings.append(Finding((key,), error.problem, key, error.nearest, at="key"))
         return False
 
-    def settings(self, form: type[BaseModel], data: Any, location: Location) -> Any:
+    def settings(self, settings_type: type[BaseModel], data: Any, location: Location) -> Any:
         """Return settings; None, reported, where they are refused."""
         try:
-            return form.model_validate(data)
+            return settings_type.model_validate(data)
         except ValidationError as error:
-            self.findings += settings_findings(error, form, location)
+            self.findings += settings_findings(error, settings_type, location)
         return None
 
     def kit(self, name: str, section: Any) -> Any:
@@ -116,14 +116,16 @@ class _Reader:
         for section in OF_MODEL if model is not None and is_robot else ():
             if found.get(section) is None:
                 found[section] = dict(getattr(model, section))
-        for section, form in SECTIONS.items():
+        for section, type_name in SECTIONS.items():
             if isinstance(found.get(section), dict):
                 components = found[section].items()
-                found[section] = {key: self.component(form, (*location, section, key), one) for key, one in components}
+                found[section] = {
+                    key: self.component(type_name, (*location, section, key), one) for key, one in components
+                }
         settings = None if model is None else self.settings(model.settings, found, location)
         return RobotSettings.model_construct(model=name) if settings is None else settings.typed(model)
 
-    def component(self, form: str, location: Location, data: Any) -> Any:
+    def component(self, type_name: str, location: Location, data: Any) -> Any:
         """Return the settings of one component; with its kind alone in place of refused ones.
 
         What many robots share, by a template, is read once.
@@ -131,10 +133,10 @@ class _Reader:
         kind = data.get("kind") if isinstance(data, dict) else None
         if not isinstance(kind, str):
             return data
-        key, count = (form, id(data)), len(self.findings)
+        key, count = (type_name, id(data)), len(self.findings)
         if key in self._read:
             return self._read[key]
-        settings, found = None, self.find(form, kind, (*location, "kind"))
+        settings, found = None, self.find(type_name, kind, (*location, "kind"))
         if found is not None:
             modifiers = data.get("modifiers")
             if isinstance(modifiers, list):
@@ -142,7 +144,7 @@ class _Reader:
                 data = {**data, "modifiers": [*map(self.component, ["modifier"] * len(modifiers), places, modifiers)]}
             settings = self.settings(found.settings, data, location)
         if settings is None:
-            return BASES[form].model_construct(kind=kind)
+            return BASES[type_name].model_construct(kind=kind)
         settings.typed(found)
         if len(self.findings) == count:
             self._read[key] = settings

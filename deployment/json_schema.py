@@ -1,4 +1,4 @@
-"""The JSON Schema of a deployment file: that of the parts that are always there, and of all forms."""
+"""The JSON Schema of a deployment file: that of the parts that are always there, and of all component types."""
 
 import json
 from typing import Any, Final
@@ -11,8 +11,8 @@ from foosim.world.component_types.descriptions import ENGINES, ComponentType, Ki
 from foosim.world.component_types.settings import BASES, EntitySettings, RobotSettings
 from foosim.world.spec import KITS
 
-OPEN: Final = {base.__name__: form for form, base in BASES.items()}
-"""Definitions that stand for anything of a form."""
+OPEN: Final = {base.__name__: type_name for type_name, base in BASES.items()}
+"""Definitions that are placeholders for all component types of a type name."""
 OWN: Final = "foosim."
 REF: Final = "#/$defs/"
 
@@ -20,23 +20,23 @@ REF: Final = "#/$defs/"
 def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
     """The JSON Schema of a deployment in which nothing is abbreviated, which the checks and the reference go by.
 
-    It has foosim's own forms; with `installed` those of other packages, too. The settings of one that is named as
-    `module:Class` are any.
+    It has foosim's own component types; with `installed` those of other packages, too. The settings of one that is
+    named as `module:Class` are any.
     """
     schema = Deployment.model_json_schema(by_alias=True, mode="validation")
     engines = [name for name in registry.engines() if installed or ENGINES[name].path.startswith(OWN)]
     schema["properties"]["engine"] = {"enum": engines, "title": "Engine", "type": "string"}
     definitions = schema["$defs"]
-    for name, form in OPEN.items():
-        if form != "model":
-            definitions[name] = _any_of_form(form, definitions, installed=installed)
+    for name, type_name in OPEN.items():
+        if type_name != "model":
+            definitions[name] = _any_of(type_name, definitions, installed=installed)
     properties = {key: value for key, value in schema["properties"].items() if key != KITS}
     for kind in registry.names("kit"):
         kit = registry.find("kit", kind)
         if installed or kit.module.startswith(OWN):
             properties[kind] = {"$ref": REF + _add(kit, definitions)}
     for section, is_robot in (("robots", True), ("objects", False)):
-        entities = _any_of_form("model", definitions, installed=installed, is_robot=is_robot)
+        entities = _any_of("model", definitions, installed=installed, is_robot=is_robot)
         ((pattern, _),) = properties[section]["patternProperties"].items()
         properties[section] = {**properties[section], "patternProperties": {pattern: entities}}
     for name in (RobotSettings.__name__, EntitySettings.__name__):
@@ -57,15 +57,15 @@ def _kit(name: str) -> Kit:
     return kit
 
 
-def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_robot: bool = True) -> dict[str, Any]:
-    """Return the schema of anything of a form by its kind, and add that of each kind to the definitions.
+def _any_of(type_name: str, definitions: dict[str, Any], *, installed: bool, is_robot: bool = True) -> dict[str, Any]:
+    """Return the schema of all component types with a type name, by kind, and add that of each kind to the definitions.
 
     Of models those of robots, or those of objects, without the ones that only a kit brings.
     """
-    key = "model" if form == "model" else "kind"
+    key = "model" if type_name == "model" else "kind"
     mapping = {}
-    for kind in registry.names(form):
-        found = registry.find(form, kind)
+    for kind in registry.names(type_name):
+        found = registry.find(type_name, kind)
         if not installed and not found.module.startswith(OWN):
             continue
         if isinstance(found, Model) and (found.is_robot != is_robot or (found.kit and not is_robot)):
@@ -74,8 +74,8 @@ def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_
         mapping[kind] = REF + name
         properties = definitions[name]["properties"]
         definitions[name]["properties"] = {**properties, key: {"const": kind, "title": key.title(), "type": "string"}}
-    noun = with_article(word_of(form)).capitalize()
-    any_class = f"{form.title().replace('_', '')}ByClass"
+    noun = with_article(word_of(type_name)).capitalize()
+    any_class = f"{type_name.title().replace('_', '')}ByClass"
     definitions[any_class] = {
         "allOf": [{"required": [key]}],  # of a part of it, too: any other part is one of a kind that is known
         "description": f"{noun} of any module on the path. Its other keys are those of its settings.",
@@ -90,19 +90,19 @@ def _any_of_form(form: str, definitions: dict[str, Any], *, installed: bool, is_
     }
 
 
-def _add(form: ComponentType, definitions: dict[str, Any]) -> str:
-    """Add the schema of a form's settings to the definitions, and what it refers to; return its name there.
+def _add(component_type: ComponentType, definitions: dict[str, Any]) -> str:
+    """Add the schema of a component type's settings to the definitions, and what it refers to; return its name there.
 
-    Classes of other packages may be called as foosim's, or each other's, are: their names have form and kind in front.
+    Classes of other packages may have equal names: theirs begin with type name and kind.
     """
-    schema = form.settings.model_json_schema(by_alias=True, ref_template=REF + "{model}")
+    schema = component_type.settings.model_json_schema(by_alias=True, ref_template=REF + "{model}")
     inner = schema.pop("$defs", {})
     schema = inner.pop(schema["$ref"].removeprefix(REF)) if "$ref" in schema else schema
-    is_own = form.module.startswith(OWN)
-    name = form.settings.__name__ if is_own else f"{form.type_name}.{form.name}"
+    is_own = component_type.module.startswith(OWN)
+    name = component_type.settings.__name__ if is_own else f"{component_type.type_name}.{component_type.name}"
     if not is_own:
         renamed = {REF + other: f"{REF}{name}.{other}" for other in inner if other not in OPEN}
-        renamed[REF + form.settings.__name__] = REF + name  # where it refers to itself
+        renamed[REF + component_type.settings.__name__] = REF + name  # where it refers to itself
         schema = _with_references(schema, renamed)
         inner = {
             (renamed.get(REF + other) or other).removeprefix(REF): _with_references(its, renamed)

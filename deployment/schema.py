@@ -3,7 +3,8 @@
 This is the schema. Text becomes a `Deployment` in loader.py only, because what one field cannot know (every robot has
 one owner, every selector matches an endpoint, every rate is a whole number of ticks) is checked there too, by
 validate.py. Quantities are strings with units in the file and SI numbers here; times are integer nanoseconds whose
-names end in `_ns` (see common/units.py). The settings of robots, components and kits are in their forms (world/).
+names end in `_ns` (see common/units.py). The settings of robots, components and kits
+are with their component types (library/).
 """
 
 from collections.abc import Mapping

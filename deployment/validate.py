@@ -556,10 +556,11 @@ def _components_of(entity: EntitySettings) -> Iterator[tuple[str, str, Component
         yield from ((section, name, settings) for name, settings in getattr(entity, section).items())
 
 
-def _needs_kit(form: ComponentType, kits: Collection[str], noun: str = "") -> Iterator[str]:
-    """Yield that the world is without the kit that a form is of."""
-    if form.kit and form.kit not in kits:
-        yield f"{noun or word_of(form.type_name)} of {with_article(form.kit)} in a world without one"
+def _needs_kit(component_type: ComponentType, kits: Collection[str], noun: str = "") -> Iterator[str]:
+    """Yield that the world is without the kit that a component type belongs to."""
+    if component_type.kit and component_type.kit not in kits:
+        noun = noun or word_of(component_type.type_name)
+        yield f"{noun} of {with_article(component_type.kit)} in a world without one"
 
 
 def _model_problems(model: Model) -> Iterator[str]:
@@ -568,25 +569,25 @@ def _model_problems(model: Model) -> Iterator[str]:
         yield f"a rigid model with couples=False, which is valid of {', '.join(REACHED)} alone"
 
 
-def _component_problems(form: ComponentType, model: Model, has: Mapping[str, int] | None) -> Iterator[str]:
+def _component_problems(component_type: ComponentType, model: Model, has: Mapping[str, int] | None) -> Iterator[str]:
     """Yield the needs of a component or rule that a robot of a model does not meet.
 
     `has` are the fields of its state; where they are not known nothing is missing.
     """
-    word = word_of(form.type_name)
-    needs: tuple[str, ...] = form.needs if isinstance(form, Component | EntityRule) else ()
-    if isinstance(form, Component) and (field := _trigger_of_model(form)) and field not in needs:
+    word = word_of(component_type.type_name)
+    needs: tuple[str, ...] = component_type.needs if isinstance(component_type, Component | EntityRule) else ()
+    if isinstance(component_type, Component) and (field := _trigger_of_model(component_type)) and field not in needs:
         needs = (*needs, field)
     missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
     if missing:
         fitting = ", ".join(_having(needs))
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {_fields_of(model, missing, has)}")
         yield f"{word} that {with_article(model.name)} cannot carry, for lack of {', '.join(missing)} ({valid})"
-    if isinstance(form, Component) and form.jobs and not model.is_solved:
+    if isinstance(component_type, Component) and component_type.jobs and not model.is_solved:
         yield f"{word} whose jobs would never end: {with_article(model.name)} is neither rigid nor has a motion"
-    if not isinstance(form, EntityRule):
+    if not isinstance(component_type, EntityRule):
         return
-    written = [] if has is None else [field for field in form.writes if field not in has]
+    written = [] if has is None else [field for field in component_type.writes if field not in has]
     if written:
         yield f"{word} that writes {', '.join(written)}: {_fields_of(model, written, has)}"
     if not model.is_solved:
@@ -821,7 +822,7 @@ def _unheard(spec: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _trial(deployment: Deployment, ends: Names) -> Iterable[Finding]:
-    """Yield the findings of a trial of forms from other packages; foosim's own are not tried."""
+    """Yield the findings of a trial of components from other packages; foosim's own are not tried."""
     if not foreign_versions(deployment):
         return ()
     from foosim.world.assembly.trial import trial_findings  # brings numpy
@@ -856,11 +857,11 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
     layout = build_layout(spec) if checked else None
     for name, section, channel, settings in checked:
         assert layout is not None
-        form = settings.component_type
-        key = draw_key(spec.seed, form.type_name, name, channel)
+        component_type = settings.component_type
+        key = draw_key(spec.seed, component_type.type_name, name, channel)
         at = Mounting(spec, layout, layout[name], channel, key, is_owners=section == "sensors")
         try:
-            form.factory.check(settings, at)
+            component_type.factory.check(settings, at)
         except IncompatibleComponent as error:
             place: Location = ("robots", name, section, channel, *error.path)
             yield Finding(place, error.problem, error.value, error.nearest)

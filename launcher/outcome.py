@@ -35,7 +35,7 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
     "capture": None,
     "reason": None,
     "failed": True,
-    "failed_form": None,
+    "failed_component": None,
 }
 
 

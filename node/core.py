@@ -26,14 +26,14 @@ from foosim.protocol.actions import Action, Log, Publish
 from foosim.protocol.barrier import BadParts, Barrier, committed_frame, input_digest_of
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.handshake import Member, NotValidHere, failed_form, sendable
+from foosim.protocol.handshake import Member, NotValidHere, failed_component, sendable
 from foosim.protocol.messages import (
     Build,
     Commit,
     Deliveries,
     End,
     Epoch,
-    FailedForm,
+    FailedComponent,
     Heartbeat,
     Order,
     Part,
@@ -75,11 +75,11 @@ class NodeCore:
         self.work: Work | None = None
         self.failure = ""
         """The error that ends the run here: a component has raised."""
-        self._failed: FailedForm | None = None
+        self._failed: FailedComponent | None = None
         self.member = Member("node", name, boot, fingerprint, world, self.actions, now_ns)
         self.busy = 0.0
         self.is_guarded = False
-        """Whether a form that writes to the frame without its view is an error: a check sets this."""
+        """Whether a component that writes to the frame without its view is an error: a check sets this."""
         self.deployment: Deployment | None = None
         self.frame: Frame | None = None
         self.epoch = 0
@@ -164,7 +164,7 @@ class NodeCore:
         """A component has raised: compute no more, and end the run, since the next owner would meet it, too."""
         self.failure = sendable(str(error))[: limits.TEXT_LENGTH_MAX]
         self.work = None
-        trace, self._failed = failed_form(error)
+        trace, self._failed = failed_component(error)
         self.actions.append(Log("error", f"{error}\n{trace}"))
         self.actions.append(Publish(channels.HEARTBEAT, self.name, encode(self._heartbeat())))
 

@@ -90,7 +90,7 @@ class Stepper:
     """The pure step of one deployment and layout: all of a tick except the engine."""
 
     def __init__(self, deployment: Deployment, layout: Layout, *, is_guarded: bool = False) -> None:
-        """`is_guarded`: a form that writes to the frame without its view is an error."""
+        """`is_guarded`: a component that writes to the frame without its view is an error."""
         self.deployment = deployment
         self.layout = layout
         self.world = World(deployment, layout, is_guarded=is_guarded)

@@ -21,10 +21,10 @@ from foosim.protocol.asset_transfer import Fetching
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import (
     Build,
+    ComponentVersion,
     Epoch,
-    FailedForm,
+    FailedComponent,
     Fetch,
-    FormVersion,
     Heartbeat,
     Hello,
     Piece,
@@ -46,14 +46,14 @@ def sendable(text: str) -> str:
 
 
 class NotValidHere(Refused):
-    """The run's deployment cannot be used on this machine: it lacks a package, or a form fails here."""
+    """The run's deployment cannot be used on this machine: it lacks a package, or a component fails here."""
 
 
-def failed_form(error: ComponentError) -> tuple[str, FailedForm]:
-    """Return the traceback of a form that has raised, and its report in a heartbeat."""
+def failed_component(error: ComponentError) -> tuple[str, FailedComponent]:
+    """Return the traceback of a component that has raised, and its report in a heartbeat."""
     trace = sendable("".join(traceback.format_exception(error.cause)))
     component, end = error.component[: limits.TEXT_LENGTH_MAX], trace[-limits.TEXT_LENGTH_MAX :]
-    return trace, FailedForm(error.entity, component, error.tick, end)
+    return trace, FailedComponent(error.entity, component, error.tick, end)
 
 
 class Member:
@@ -220,8 +220,8 @@ class Member:
         if self.standing is not None:
             self._actions.append(self.standing())
         versions = foreign_versions(self.deployment) if self.role == "node" and self.deployment is not None else {}
-        forms = [FormVersion(name, version) for name, version in versions.items()]
-        ready = Ready(self.name, self.boot, self.layout.digest, self.simulation or self._fingerprint, forms)
+        components = [ComponentVersion(name, version) for name, version in versions.items()]
+        ready = Ready(self.name, self.boot, self.layout.digest, self.simulation or self._fingerprint, components)
         self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
     def entered(self) -> None:

@@ -21,15 +21,15 @@ from foosim.world.start import Origin
 # --- simulation plane: the tick --------------------------------------------------------------------------------------
 
 
-class FormVersion(Item, frozen=True):
-    """The version of a form from another package: `name` is its form, module and class."""
+class ComponentVersion(Item, frozen=True):
+    """The version of a component from another package: `name` is its type name, module and class."""
 
-    name: Annotated[str, Meta(max_length=limits.FORM_NAME_MAX)]
-    version: Annotated[str, Meta(max_length=limits.FORM_NAME_MAX)]
+    name: Annotated[str, Meta(max_length=limits.COMPONENT_NAME_MAX)]
+    version: Annotated[str, Meta(max_length=limits.COMPONENT_NAME_MAX)]
 
 
-class FailedForm(Item, frozen=True):
-    """A form has raised: the `component`, its `entity` (empty for one of the world), the tick and the end of the
+class FailedComponent(Item, frozen=True):
+    """A component has raised: its label, its `entity` (empty for one of the world), the tick and the end of the
     traceback."""
 
     entity: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)]
@@ -138,7 +138,7 @@ the run has ended and that the vHub closes the capture."""
 class Heartbeat(Message, frozen=True):
     """Progress of a process, ten times a second: `waiting_for` names what its tick lacks, `lost` is the reason why the
     run cannot continue (a client is lost, a component has raised), `busy` is its load (0 to 1), `report` is JSON for
-    display, `failed` the form that has raised.
+    display, `failed` the component that has raised.
 
     The vHub sends one without a report before late deliveries, to name the clients that these waited for."""
 
@@ -149,7 +149,7 @@ class Heartbeat(Message, frozen=True):
     lost: Text
     busy: float
     report: Annotated[bytes, Meta(max_length=limits.RADIO_MESSAGE_BYTES_MAX)]
-    failed: FailedForm | None = None
+    failed: FailedComponent | None = None
 
 
 # --- simulation plane: membership -----------------------------------------------------------------------------------
@@ -200,14 +200,14 @@ class Ready(Message, frozen=True):
     """The process has built the layout with this digest; of the vHub, all declared lockstep clients have joined too.
 
     A node's `fingerprint` is the digest of a fixed short run of its engine: equal fingerprints compute equal worlds.
-    Its `forms` are the versions of the forms of the world from other packages.
+    Its `components` are the versions of the components of the world from other packages.
     """
 
     name: Name
     boot: Name
     layout: Digest
     fingerprint: Digest
-    forms: Annotated[list[FormVersion], Meta(max_length=limits.FORMS_MAX)] = field(default_factory=list)
+    components: Annotated[list[ComponentVersion], Meta(max_length=limits.COMPONENTS_MAX)] = field(default_factory=list)
 
 
 class Epoch(Message, frozen=True):
@@ -232,12 +232,12 @@ class Tempo(Message, frozen=True):
 
 
 class End(Message, frozen=True):
-    """The run is over after `tick` ticks; `form` is the one whose error ended it, if any."""
+    """The run is over after `tick` ticks; `failed_component` is the one whose error ended it, if any."""
 
     tick: Counter
     reason: Text
     failed: bool
-    form: FailedForm | None = None
+    failed_component: FailedComponent | None = None
 
 
 class Farewell(Message, frozen=True):

@@ -127,7 +127,7 @@ class Settings:
     node: type[NodeCore] = NodeCore
     """The cores' classes: tests plant faults by subclasses."""
     is_guarded: bool = False
-    """Whether forms that write to the frame otherwise than by their views are errors."""
+    """Whether components that write to the frame otherwise than by their views are errors."""
     keeps_journals: bool = False
     """Whether the supervisor's journal is kept, so that it can be restarted."""
     restart_ns: int = 0

@@ -206,7 +206,7 @@ class Simulation:
 
         A robot without a command keeps its last one. Raises UnknownName for a robot that no agent commands or that
         takes no such command, BadValue for an absent robot and for invalid names and numbers of a command,
-        ComponentError and PlayerError for a form and a player that fail.
+        ComponentError and PlayerError for a failing component or player.
         """
         by_agent: dict[str, list[Packet]] = {name: [] for name in self.agents}
         if self._encoder is None:

@@ -24,7 +24,7 @@ from foosim.protocol.messages import (
     Commit,
     Deliveries,
     End,
-    FailedForm,
+    FailedComponent,
     Farewell,
     Fetch,
     Heartbeat,
@@ -201,7 +201,9 @@ class SupervisorCore:
         self.closing.on_standstill(stood_ns, now_ns)
         self.failover.on_standstill(stood_ns)
 
-    def finish(self, reason: str, failed: bool, tick: int | None = None, form: FailedForm | None = None) -> None:
+    def finish(
+        self, reason: str, failed: bool, tick: int | None = None, component: FailedComponent | None = None
+    ) -> None:
         """End the run in order, once: at the last committed tick, or at an earlier one that is the last in the capture.
 
         A run that was only resumed is abandoned.
@@ -213,7 +215,7 @@ class SupervisorCore:
             state.finished = True
             state.log("error", f"the run does not continue from tick {state.frame.tick}: {reason}")
             return
-        state.end = End(state.frame.tick if tick is None else tick, reason, failed, form)
+        state.end = End(state.frame.tick if tick is None else tick, reason, failed, component)
         self.closing.ended(self.progress.now_ns)
         state.log("error" if failed else "info", f"run ends at tick {state.frame.tick}: {reason}")
         state.journal(state.end)
@@ -474,11 +476,11 @@ class SupervisorCore:
             self._fail_by(heartbeat)
 
     def _fail_by(self, heartbeat: Heartbeat) -> None:
-        """A process has reported why the run cannot continue; the traceback of a failed form is logged here, too."""
-        form = heartbeat.failed
-        if form is not None:
-            self.state.log("error", f"{heartbeat.lost}\n{form.traceback}")
-        self.finish(heartbeat.lost, failed=True, form=form)
+        """A process has reported why the run cannot continue; the traceback of a component is logged here, too."""
+        component = heartbeat.failed
+        if component is not None:
+            self.state.log("error", f"{heartbeat.lost}\n{component.traceback}")
+        self.finish(heartbeat.lost, failed=True, component=component)
 
     def _is_of_now(self, heartbeat: Heartbeat) -> bool:
         """Whether a node's heartbeat is of the present epoch, at a tick that a node can have reached."""

@@ -140,7 +140,7 @@ class Roster:
             self.by_name.pop(process.name)
             return "its world has another layout than the supervisor's: install the same version on all machines"
         if process.role == "node":
-            there = {form.name: form.version for form in ready.forms}
+            there = {one.name: one.version for one in ready.components}
             differing = _differing(there, foreign_versions(self.deployment))
             if differing:
                 self.by_name.pop(process.name)
@@ -172,7 +172,7 @@ class Roster:
 
 
 def _differing(there: Mapping[str, str], here: Mapping[str, str]) -> str:
-    """Return which form has another version in a node than in the supervisor, empty if none has."""
+    """Return which component has another version in a node than in the supervisor, empty if none has."""
     for name in sorted({*there, *here}):
         if there.get(name) != here.get(name):
             versions = there.get(name, "missing"), here.get(name, "missing")

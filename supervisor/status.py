@@ -82,7 +82,9 @@ def result(state: RunState) -> dict[str, Any]:
         "capture": report.get("capture") or None,
         "reason": "; ".join(part for part in (state.end.reason, cut_off) if part) if state.end is not None else None,
         "failed": state.end is not None and (state.end.failed or bool(cut_off)),
-        "failed_form": None if state.end is None or state.end.form is None else asdict(state.end.form),
+        "failed_component": None
+        if state.end is None or state.end.failed_component is None
+        else asdict(state.end.failed_component),
     }
 
 

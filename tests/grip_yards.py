@@ -11,7 +11,7 @@ from foosim.client.player import Player, Samples
 from foosim.deployment.schema import Deployment
 from foosim.library.rigid.gripper import Grip
 from foosim.library.rigid.players.workshop import HAND_M as FRONT_M
-from tests.forms.worlds import DEPLOY
+from tests.components.worlds import DEPLOY
 
 __all__ = ["FRONT_M"]
 NAME: Final = "cranes.yaml"

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import yaml
 
-from tests.forms.worlds import DEPLOY, driver
+from tests.components.worlds import DEPLOY, driver
 from tests.grip_yards import Script, crane, crate
 from tests.heads import folder, head
 

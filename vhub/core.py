@@ -25,7 +25,7 @@ from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Log, Publish
 from foosim.protocol.channels import Channel
 from foosim.protocol.codec import encode
-from foosim.protocol.handshake import Member, NotValidHere, failed_form, sendable
+from foosim.protocol.handshake import Member, NotValidHere, failed_component, sendable
 from foosim.protocol.hub_messages import ResumeGrant, ResumeState
 from foosim.protocol.messages import (
     CAPTURE,
@@ -40,7 +40,7 @@ from foosim.protocol.messages import (
     Down,
     End,
     Epoch,
-    FailedForm,
+    FailedComponent,
     Failure,
     Farewell,
     Heartbeat,
@@ -174,7 +174,7 @@ class HubCore:
         self._samples: dict[int, list[tuple[bytes, Samples]]] = {}
         self._sent: dict[int, bytes] = {}
         self._world: _World | None = None
-        self._failed: FailedForm | None = None
+        self._failed: FailedComponent | None = None
         self._retry = RetryTimer(now_ns)
         clients = self.clients
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
@@ -667,8 +667,8 @@ class HubCore:
         self.give_up(lost(name, why))
 
     def fail(self, error: ComponentError) -> None:
-        """A form has raised: close no more ticks, and have the run end."""
-        _, self._failed = failed_form(error)
+        """A component has raised: close no more ticks, and have the run end."""
+        _, self._failed = failed_component(error)
         self.give_up(sendable(str(error))[: limits.TEXT_LENGTH_MAX])
 
     def give_up(self, reason: str) -> None:

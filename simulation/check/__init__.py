@@ -1,1 +1,1 @@
-"""The laws of forms, checked in the rehearsals of a deployment that uses them."""
+"""The laws of components, checked in the rehearsals of a deployment that uses them."""

@@ -1,8 +1,9 @@
-"""Checks that the forms of a deployment obey the laws: any number of nodes is the same, and all memory is in the frame.
+"""Checks that the components of a deployment obey the laws: any number of nodes gives the same world, and all memory
+is in the frame.
 
-The deployment is rehearsed several times; a difference is reported with its first tick and slot. It reveals a form that
-stores state in an object, reads a clock, draws from a running generator or by its place among others, sums in the order
-of the file or stores an entity as a number.
+The deployment is rehearsed several times; a difference is reported with its first tick and slot. It reveals a
+component that stores state in an object, reads a clock, draws from a running generator or by its place among others,
+sums in the order of the file or stores an entity as a number.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from foosim.deployment.schema import Deployment
 from foosim.simulation.check.changes import changed, with_comings
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings, System
-from foosim.world.assembly.versions import forms_of
+from foosim.world.assembly.versions import component_types_of
 from foosim.world.assembly.world import World, commands_together
 from foosim.world.component_types import registry
 from foosim.world.component_types.descriptions import ComponentType
@@ -40,26 +41,24 @@ NAMED_MAX: Final = 4
 """Actuators that a message about several names."""
 
 
-def used_form(text: str, name: str, wanted: str) -> ComponentType:
-    """Return the form of a deployment that is wanted: a name, a form and a name, or module:Class.
+def used_component_type(text: str, name: str, wanted: str) -> ComponentType:
+    """Return the wanted component type of a deployment, by its name, its type name and name, or module:Class.
 
     Raises BadValue where the deployment uses none or several of that name.
     """
-    forms = forms_of(load_deployment(text, name))
-    labels = {f"{form.type_name} {form.name}": form for form in forms}
+    used = component_types_of(load_deployment(text, name))
+    labels = {f"{one.type_name} {one.name}": one for one in used}
     if wanted in labels:
         return labels[wanted]
-    form_name, _, kind = wanted.rpartition(" ")
+    type_name, _, kind = wanted.rpartition(" ")
     made = registry.class_at(kind) if ":" in kind else None
-    found = [
-        form for form in forms if form_name in ("", form.type_name) and (kind == form.name or made is form.factory)
-    ]
+    found = [one for one in used if type_name in ("", one.type_name) and (kind == one.name or made is one.factory)]
     if len(found) == 1:
         return found[0]
     if found:
-        which = " or ".join(f"{form.type_name} {form.name}" for form in found)
+        which = " or ".join(f"{one.type_name} {one.name}" for one in found)
         raise BadValue(f"several components of {name} are called this: {which}", wanted)
-    choices = [*labels] if " " in wanted or ":" in wanted else [form.name for form in forms]
+    choices = [*labels] if " " in wanted or ":" in wanted else [one.name for one in used]
     raise UnknownName(f"{name} uses no component called this", wanted, choices)
 
 

@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 from foosim.cli.components import chosen
 from foosim.common.errors import DeploymentError, UnknownName
 from foosim.deployment.loader import apply_sets
-from foosim.world.component_types.registry import FORMS, names
+from foosim.world.component_types.registry import TYPE_NAMES, names
 from tests.conftest import Typed
 from tests.own_components import folder_on_path
 
@@ -122,7 +122,9 @@ def test_a_form_is_told_of_with_what_it_brings(told: Telling, about: tuple[str, 
 
 def test_all_are_told_of_in_json(told: Telling) -> None:
     found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])["components"]
-    assert [(one["type"], one["name"]) for one in found] == [(form, name) for form in FORMS for name in names(form)]
+    assert [(one["type"], one["name"]) for one in found] == [
+        (form, name) for form in TYPE_NAMES for name in names(form)
+    ]
     by_name = {(one["type"], one["name"]): one for one in found}
     rover, football = by_name["model", "rover"], by_name["rule", "football"]
     assert (rover["mover"], rover["is_robot"], rover["tags"]) == ("WheeledMotion", True, ["vehicle"])

@@ -41,15 +41,15 @@ from foosim.simulation.what_if import what_if
 from foosim.vhub.state.records import Closing
 from foosim.world.assembly.islands import Assignment, Share
 from foosim.world.assembly.rest import Rest
-from foosim.world.assembly.versions import forms_of
+from foosim.world.assembly.versions import component_types_of
 from foosim.world.assembly.volumes import BodyIsland, Volumes
 from foosim.world.component_types.descriptions import NO_ENTITY
 from foosim.world.components.reach import Island
 from foosim.world.edits import counters, parked
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity
-from tests.forms.test_forms import ALONE, own
-from tests.forms.worlds import DEPLOY, still
+from tests.components.test_components import ALONE, own
+from tests.components.worlds import DEPLOY, still
 from tests.frames import Frames
 from tests.simulation.test_verify import messages_of
 from tests.swarm.world_bounds import strays
@@ -230,7 +230,7 @@ WHOLE: Final = ("mixed", "everything")
 def test_every_form_is_in_a_world_of_all_or_has_its_laws_tested_alone() -> None:
     used: set[tuple[str, str]] = set()
     for name in WHOLE:
-        used |= {(form.type_name, form.name) for form in forms_of(loaded(name))}
+        used |= {(form.type_name, form.name) for form in component_types_of(loaded(name))}
     assert set(own()) - used == {*ALONE}
 
 

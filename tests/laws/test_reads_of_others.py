@@ -21,7 +21,7 @@ from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.component_types.descriptions import NO_ENTITY
 from foosim.world.edits import Remove
 from foosim.world.frame import Frame
-from tests.forms.worlds import HALL, TABLE, World, driver
+from tests.components.worlds import HALL, TABLE, World, driver
 from tests.frames import Frames, broken_laws
 from tests.placing import added_ball
 

@@ -11,7 +11,7 @@ from foosim.client.loading import load_player
 from foosim.common.errors import BadValue
 from foosim.deployment.schema import Deployment
 from foosim.simulation.simulation import read_for_stepping
-from tests.forms.worlds import DEPLOY
+from tests.components.worlds import DEPLOY
 
 FILES: Final = ("table.yaml", "warehouse.yaml", "yard.yaml", "workshop.yaml")
 CASES: Final[list[tuple[str, str, dict[str, Any], str]]] = [

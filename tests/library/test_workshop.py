@@ -14,7 +14,7 @@ from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.simulation import Simulation
 from foosim.simulation.system import Settings, System
 from foosim.world.frame import Frame
-from tests.forms.worlds import DEPLOY
+from tests.components.worlds import DEPLOY
 from tests.frames import Frames
 
 WORKSHOP: Final[Path] = DEPLOY / "workshop.yaml"

@@ -29,7 +29,7 @@ from foosim.library.rigid.players.yard_arm import NEAR_M, UPRIGHT, Arm
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings
 from foosim.world.frame import Frame
-from tests.forms.worlds import DEPLOY
+from tests.components.worlds import DEPLOY
 
 YARD: Final[Path] = DEPLOY / "yard.yaml"
 SEEDS: Final = range(1, 6)

@@ -22,7 +22,7 @@ from foosim.world.components.grasping import grasp_of
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import moved, multiply, rotate
-from tests.forms.worlds import DEPLOY
+from tests.components.worlds import DEPLOY
 from tests.grip_yards import FRONT_M, NAME, SIDE_M, crane, crate, porter, world
 
 GRAVITY: Final = 9.80665

@@ -28,7 +28,7 @@ from foosim.world.component_types.per_field import codec_of
 from foosim.world.component_types.registry import find_component
 from foosim.world.components.fitted import actuators_of
 from foosim.world.layout import build_layout
-from tests.forms.worlds import DEPLOY
+from tests.components.worlds import DEPLOY
 from tests.heads import EYE_M, TILT_M, folder, head
 from tests.kinematic_yard import TICK_S, yard_text
 

@@ -21,7 +21,7 @@ from foosim.common.errors import BadValue, DeploymentError
 from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.mobile.set_points import MotionSetPoints
-from foosim.simulation.check.component_check import ComponentCheck, used_form
+from foosim.simulation.check.component_check import ComponentCheck, used_component_type
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.world.components.view import View
@@ -223,10 +223,10 @@ def test_an_actuator_that_asks_for_something_else_beside_its_like_is_found(monke
 
 def test_a_form_is_named_as_deployments_do() -> None:
     text = TABLE.read_text()
-    assert used_form(text, TABLE.name, "encoder").type_name == "sensor"
-    assert used_form(text, TABLE.name, "rule football").name == "football"
-    assert used_form(text, TABLE.name, "foosim.library.table.rod:Rod").type_name == "model"
-    assert used_form(text, TABLE.name, "model foosim.library.table.rod:Rod").type_name == "model"
+    assert used_component_type(text, TABLE.name, "encoder").type_name == "sensor"
+    assert used_component_type(text, TABLE.name, "rule football").name == "football"
+    assert used_component_type(text, TABLE.name, "foosim.library.table.rod:Rod").type_name == "model"
+    assert used_component_type(text, TABLE.name, "model foosim.library.table.rod:Rod").type_name == "model"
 
 
 WRONG: Final = {
@@ -243,7 +243,7 @@ WRONG: Final = {
 def test_a_wrong_name_says_what_there_is_and_the_nearest(wanted: str) -> None:
     text = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure"])
     with pytest.raises(BadValue) as error:
-        used_form(text, TABLE.name, wanted)
+        used_component_type(text, TABLE.name, wanted)
     assert WRONG[wanted] in str(error.value) and error.value.exit_code == 2
 
 
@@ -253,16 +253,16 @@ def test_a_name_of_several_forms_says_which(planted: Path) -> None:
     )
     text = apply_sets(TABLE.read_text(), TABLE.name, [OF_ROD.replace(":Own", ":First"), OF_WORLD])
     with pytest.raises(BadValue, match=r"several components of table\.yaml are called this: rule own or sensor own"):
-        used_form(text, TABLE.name, "own")
-    assert used_form(text, TABLE.name, "rule own").type_name == "rule"
+        used_component_type(text, TABLE.name, "own")
+    assert used_component_type(text, TABLE.name, "rule own").type_name == "rule"
 
 
 def test_a_class_is_the_one_that_its_path_leads_to(planted: Path) -> None:
     """Wherever it was imported from, in the deployment and in the question."""
     (planted / "mine.py").write_text("from foosim.library.table.encoder import Encoder as Mine\n")
     text = apply_sets(TABLE.read_text(), TABLE.name, ["robots.red.goal.sensors.encoder.kind=mine:Mine"])
-    assert used_form(text, TABLE.name, "mine:Mine").name == "encoder"
-    assert used_form(TABLE.read_text(), TABLE.name, "sensor mine:Mine").name == "encoder"
+    assert used_component_type(text, TABLE.name, "mine:Mine").name == "encoder"
+    assert used_component_type(TABLE.read_text(), TABLE.name, "sensor mine:Mine").name == "encoder"
 
 
 ALARMS: Final = """

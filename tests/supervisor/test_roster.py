@@ -14,7 +14,7 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.node.core import NodeCore, NodeStatistics
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import Build, FormVersion, Heartbeat, Hello, Ready, Refusal
+from foosim.protocol.messages import Build, ComponentVersion, Heartbeat, Hello, Ready, Refusal
 from foosim.supervisor import roster as roster_module
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.roster import SILENT_NS, Roster
@@ -100,9 +100,9 @@ def test_nodes_with_another_version_of_a_form_are_refused(
     for deployment in (DEPLOYMENT, MIXED):
         roster = Roster(deployment, PRINT)
         one, other = roster.take(HELLO, 0), roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
-        same = [FormVersion(name, version) for name, version in here.items()]
+        same = [ComponentVersion(name, version) for name, version in here.items()]
         assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT, same), LAYOUT) == ""
-        others = [FormVersion(name, version) for name, version in there.items()]
+        others = [ComponentVersion(name, version) for name, version in there.items()]
         reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, PRINT, others), LAYOUT)
         assert reason == f"sensor own:Gauge {why}: install the same on all machines"
         assert "blue" not in roster.by_name and "red" in roster.by_name

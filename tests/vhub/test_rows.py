@@ -47,7 +47,7 @@ from foosim.world.edits import Add, Edit, Push, Remove
 from foosim.world.frame import Frame
 from foosim.world.kinematics import CENTRE_OF_SLOT, forward_kinematics, twist
 from foosim.world.layout import build_layout
-from tests.forms.worlds import DEPLOY
+from tests.components.worlds import DEPLOY
 from tests.vhub.conftest import DOWN_FROM, DOWN_TO
 from tests.whole_worlds import assets, written, yard
 

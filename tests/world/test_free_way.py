@@ -15,7 +15,7 @@ from foosim.world.moving.solids import scenery_of
 from foosim.world.moving.upright import made_model, upright_of
 from foosim.world.rays.outlines import Outline, outline
 from foosim.world.scene import shape_box
-from tests.forms.worlds import TABLE
+from tests.components.worlds import TABLE
 from tests.kinematic_yard import Yard, drawn, yard_text
 
 COMMANDS: Final = {

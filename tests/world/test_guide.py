@@ -32,10 +32,10 @@ BASES: Final = ("omni.py", "omni_drive.py", "yard.py", "rounds.py", "yard.yaml")
 
 
 class Use(NamedTuple):
-    """How the guide uses an example: in which deployment, with which settings, as which form, beside which files."""
+    """How the guide uses an example: its deployment, settings, component and other files."""
 
     deployment: str
-    form: str
+    component: str
     sets: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     is_package: bool = False
@@ -148,11 +148,11 @@ def test_an_example_is_the_same_world_on_any_number_of_nodes(folder: Path, rehea
 def test_the_check_of_components_finds_nothing_in_an_example(
     folder: Path, supervisor: Command, names: tuple[str, ...]
 ) -> None:
-    """Whichever form it is asked for, it compares all of the world."""
+    """Whichever component is named, it compares all of the world."""
     deployments, settings = zip(*[planted(folder, name) for name in names], strict=True)
     (deployment,), sets = {*deployments}, [word for words in settings for word in words]
-    form, ticks = USES[names[-1]].form, str(TICKS[USES[names[-1]].deployment])
-    done = supervisor("check-component", form, "--in", deployment, "--set", FORCED, *sets, "--ticks", ticks)
+    component, ticks = USES[names[-1]].component, str(TICKS[USES[names[-1]].deployment])
+    done = supervisor("check-component", component, "--in", deployment, "--set", FORCED, *sets, "--ticks", ticks)
     assert done.code == 0 and "the same world on 1, 2 and 3 nodes" in done.out, done
 
 

@@ -22,7 +22,7 @@ from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.simulation.run import Rehearsed, rehearse
 from foosim.simulation.system import Settings
 from foosim.world.component_types.per_field import codec_of
-from foosim.world.component_types.registry import FORMS, find, find_component, names
+from foosim.world.component_types.registry import TYPE_NAMES, find, find_component, names
 from foosim.world.frame import Frame
 from tests.deployed import TABLE, TEXT, deployed
 from tests.own_components import fresh, install, problems
@@ -157,7 +157,7 @@ MODULES: Final = {
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder on the path with modules of somebody's own."""
-    for form in FORMS:
+    for form in TYPE_NAMES:
         names(form)
     folder = tmp_path / "site"
     folder.mkdir()
@@ -189,7 +189,7 @@ def printed(code: str, folder: Path | None = None) -> Any:
 # --- foosim's own ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", TYPE_NAMES)
 def test_each_is_in_a_module_of_its_name_and_has_a_summary(form: str) -> None:
     for name in names(form):
         component = find(form, name)

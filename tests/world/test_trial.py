@@ -18,8 +18,8 @@ from foosim.deployment.loader import read_deployment
 from foosim.simulation.check.component_check import ComponentCheck
 from foosim.simulation.run import rehearse
 from foosim.simulation.settings import Settings
+from tests.components.worlds import HALL, ROVERS, World
 from tests.conftest import Typed
-from tests.forms.worlds import HALL, ROVERS, World
 from tests.own_components import folder_on_path
 
 NAME: Final = "own.yaml"
@@ -182,7 +182,7 @@ def planted(folder: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> None:
 def test_what_works_is_valid_and_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     planted(tmp_path, monkeypatch, GOOD)
     done = rehearse(own_world().text(), NAME, 50, 2)
-    assert not done.json["failed"] and done.json["ticks"] == 50 and done.json["failed_form"] is None
+    assert not done.json["failed"] and done.json["ticks"] == 50 and done.json["failed_component"] is None
 
 
 PLACES: Final = {
@@ -343,7 +343,7 @@ def test_a_misdeed_at_any_tick_ends_the_run_with_its_name_its_tick_and_its_line(
     logged: list[str] = []
     settings = Settings(on_log=lambda process, level, text: logged.append(text) if process == "supervisor" else None)
     done = rehearse(own_world().text(), NAME, 30, 2, settings=settings).json
-    name, form = AT_TICKS[component, method], done["failed_form"]
+    name, form = AT_TICKS[component, method], done["failed_component"]
     found = re.search(rf"{name}.* failed at tick (\d+): .*{re.escape(MISDEEDS[line])}", done["reason"])
     assert done["failed"] and found is not None and TICK <= int(found[1]) == form["tick"] <= TICK + 5, done["reason"]
     assert any(form["traceback"] in text for text in logged)

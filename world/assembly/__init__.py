@@ -1,1 +1,1 @@
-"""A world built from its forms: its engine-independent computation, its start, the division of its ticks."""
+"""A world built from its components: its engine-independent computation, its start, the division of its ticks."""

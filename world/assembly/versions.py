@@ -31,13 +31,13 @@ PACKAGE: Final = 5
 """The kind of a package in `modulefinder`."""
 
 
-def forms_of(spec: WorldSpec) -> list[ComponentType]:
+def component_types_of(spec: WorldSpec) -> list[ComponentType]:
     """Return the component types of a world, each once, by type and name."""
-    found = {(form.type_name, form.name): form for form in _forms_of(spec)}
-    return [form for _, form in sorted(found.items())]
+    found = {(one.type_name, one.name): one for one in _component_types_of(spec)}
+    return [one for _, one in sorted(found.items())]
 
 
-def _forms_of(spec: WorldSpec) -> Iterator[ComponentType]:
+def _component_types_of(spec: WorldSpec) -> Iterator[ComponentType]:
     for kit in spec.kit_types.values():
         yield kit
         yield from map(registry.find_model, (*kit.entities.values(), *spares_of(spec, kit).values()))
@@ -68,8 +68,8 @@ def foreign_versions(spec: WorldSpec) -> dict[str, str]:
 
     A version is a digest of the sources.
     """
-    foreign = [form for form in forms_of(spec) if not form.is_own]
-    return {f"{form.type_name} {form.module}:{form.factory.__qualname__}": _version(form.factory) for form in foreign}
+    foreign = [one for one in component_types_of(spec) if not one.is_own]
+    return {f"{one.type_name} {one.module}:{one.factory.__qualname__}": _version(one.factory) for one in foreign}
 
 
 @cache

@@ -37,7 +37,7 @@ ROBOTS: Final = "*"
 SLOTS_MAX: Final = 65_536
 """Numbers in all slots of one component, model, motion or rule."""
 WORDS: Final[Mapping[str, str]] = MappingProxyType({"entity_rule": "rule of entities", "rule": "rule of worlds"})
-"""The nouns of forms, where these differ from their names."""
+"""The nouns of component types, where these differ from their names."""
 NO_SLOTS: Final[Mapping[str, int]] = MappingProxyType({})
 NO_SETTINGS: Final[Mapping[str, float | None]] = MappingProxyType({})
 
@@ -103,9 +103,9 @@ def overrides(kind: Callable[..., Any], hook: str) -> bool:
     return bool(having) and having[0].__module__ != BASE_CLASSES
 
 
-def word_of(form: str) -> str:
+def word_of(type_name: str) -> str:
     """Return the noun of a component."""
-    return WORDS.get(form, form)
+    return WORDS.get(type_name, type_name)
 
 
 def with_article(noun: str) -> str:

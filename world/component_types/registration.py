@@ -39,7 +39,7 @@ TYPES: Final[Mapping[str, Any]] = {
 """The types of a description's fields."""
 
 
-def check_form(found: Any) -> None:
+def check_component_type(found: Any) -> None:
     """Refuse a component with an invalid description. Raises Refused."""
     word, name = word_of(found.type_name), found.name
     if not (isinstance(name, str) and is_name(name)):

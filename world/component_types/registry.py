@@ -1,8 +1,8 @@
 """The registry of component types: models, sensors, rules and all other parts of a world, by type and name.
 
-Each is in a file of its own and registers itself there, under its name in deployments. One of foosim's own is in the
-folder of its form, or in a folder of that, in a module of its name; one of another package is in a module that the
-package names as an entry point of the group `foosim.world`; and `module:Class` names one of any module on the path.
+Each is in a file of its own and registers itself there, under its name in deployments. foosim's own are in modules of
+their names in `library/`; those of another package are in a module that the package names as an entry point of the
+group `foosim.world`; and `module:Class` names one of any module on the path.
 A module is imported when one of its component types is looked up.
 """
 
@@ -33,7 +33,7 @@ from foosim.world.component_types.descriptions import (
     word_of,
 )
 from foosim.world.component_types.failures import failure_of, in_library
-from foosim.world.component_types.registration import check_form
+from foosim.world.component_types.registration import check_component_type
 from foosim.world.component_types.settings import ComponentSettings
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 GROUP: Final = "foosim.world"
 LIBRARY: Final = "foosim.library"
 """Where foosim's own are: each in a module of its name, in a folder for the kind of world."""
-FORMS: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit")
+TYPE_NAMES: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit")
 BY_CLASS: Final = "module:Class"
 """The notation of a component type by its class, beside its name."""
 
@@ -99,8 +99,8 @@ def rule(name: str, settings: type[ComponentSettings], **about: Any) -> Decorato
 
     def register(made: Made) -> Made:
         is_of_entity = getattr(made, "type_name", "") == "entity_rule"
-        kind, form = (EntityRule, "entity_rule") if is_of_entity else (WorldRule, "rule")
-        return _registering(kind, form, name, settings, **about)(made)
+        kind, type_name = (EntityRule, "entity_rule") if is_of_entity else (WorldRule, "rule")
+        return _registering(kind, type_name, name, settings, **about)(made)
 
     return register
 
@@ -115,20 +115,20 @@ def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
     return _registering(Kit, "kit", name, settings, **about)
 
 
-def _registering(kind: type[Any], form: str, name: str, settings: type[Any], **about: Any) -> Decorator:
+def _registering(kind: type[Any], type_name: str, name: str, settings: type[Any], **about: Any) -> Decorator:
     def register(made: Made) -> Made:
-        if "slots" in about and form != "model":
+        if "slots" in about and type_name != "model":
             what = "its slots are declared in its class, as offset = slot(3), not by slots="
-            raise Refused(f"{word_of(form)} {name} of {made.__module__}: {what}")
+            raise Refused(f"{word_of(type_name)} {name} of {made.__module__}: {what}")
         its = about | _declared(made, about)
-        found = _described(kind, {"type_name": form, "name": name, "factory": made, "settings": settings, **its})
-        check_form(found)
-        key = form, name
+        found = _described(kind, {"type_name": type_name, "name": name, "factory": made, "settings": settings, **its})
+        check_component_type(found)
+        key = type_name, name
         if found.module != _own_modules().get(name):
-            _own(form, name)
+            _own(type_name, name)
         first = _known.setdefault(key, found)
         if (first.module, first.factory.__qualname__) != (found.module, made.__qualname__):
-            raise Refused(f"{form} {name} is registered by {first.module} and {found.module}")
+            raise Refused(f"{type_name} {name} is registered by {first.module} and {found.module}")
         _known[key] = found
         return made
 
@@ -162,32 +162,32 @@ def _described(kind: type[Any], about: dict[str, Any]) -> Any:
 # --- finding ---------------------------------------------------------------------------------------------------------
 
 
-def find(form: str, kind: str) -> ComponentType:
+def find(type_name: str, kind: str) -> ComponentType:
     """Return the component type with this `kind` in a deployment: a registered name, or `module:Class`.
 
     Raises UnknownName, which has the nearest name, and BadValue for a module that cannot be imported, or an
     unregistered class in it.
     """
-    found = lookup(form, kind)
+    found = lookup(type_name, kind)
     if found is None:
-        raise unknown(form, kind, names(form))
+        raise unknown(type_name, kind, names(type_name))
     return found
 
 
-def unknown(form: str, kind: str, choices: Iterable[str]) -> UnknownName:
+def unknown(type_name: str, kind: str, choices: Iterable[str]) -> UnknownName:
     """Return the error for an unknown name, with the packages that could not be imported."""
-    others = () if form == "engine" else (f"any {BY_CLASS}",)
-    return UnknownName("; ".join([f"unknown {word_of(form)}", *load_entry_points()]), kind, choices, *others)
+    others = () if type_name == "engine" else (f"any {BY_CLASS}",)
+    return UnknownName("; ".join([f"unknown {word_of(type_name)}", *load_entry_points()]), kind, choices, *others)
 
 
-def lookup(form: str, kind: str) -> ComponentType | None:
+def lookup(type_name: str, kind: str) -> ComponentType | None:
     """Return the component type as `find`, or None for an unknown name; raises BadValue for a class as `find` does."""
     if ":" in kind:
-        return _of_class(form, kind)
-    found = _known.get((form, kind)) or _own(form, kind)
+        return _of_class(type_name, kind)
+    found = _known.get((type_name, kind)) or _own(type_name, kind)
     if found is None:
         load_entry_points()
-        found = _known.get((form, kind))
+        found = _known.get((type_name, kind))
     return found
 
 
@@ -204,9 +204,9 @@ def engines() -> list[str]:
     return sorted(ENGINES)
 
 
-def find_component(form: str, kind: str) -> Component:
+def find_component(type_name: str, kind: str) -> Component:
     """Return a sensor, actuator or modifier; raises like `find`."""
-    found = find(form, kind)
+    found = find(type_name, kind)
     assert isinstance(found, Component), found
     return found
 
@@ -218,8 +218,8 @@ def find_model(kind: str) -> Model:
     return found
 
 
-def names(form: str) -> list[str]:
-    """Return the names of all installed forms, in name order: foosim's own, and those of other packages."""
+def names(type_name: str) -> list[str]:
+    """Return the names of all installed component types with a type name, sorted."""
     for module in _own_modules().values():
         import_module(module)
     load_entry_points()
@@ -227,7 +227,8 @@ def names(form: str) -> list[str]:
     return sorted(
         name
         for (known, name), found in _known.items()
-        if known == form and (found.module == _own_modules().get(name) or found.module.partition(".")[0] in packages)
+        if known == type_name
+        and (found.module == _own_modules().get(name) or found.module.partition(".")[0] in packages)
     )
 
 
@@ -260,11 +261,11 @@ def _load(entry: EntryPoint) -> str:
     return ""
 
 
-def _own(form: str, name: str) -> ComponentType | None:
+def _own(type_name: str, name: str) -> ComponentType | None:
     """Return one of foosim's own, imported from its module; None for an unknown name."""
     if name in _own_modules():
         import_module(_own_modules()[name])
-    return _known.get((form, name))
+    return _known.get((type_name, name))
 
 
 @cache
@@ -322,16 +323,16 @@ def _not_found(path: str, missing: str) -> BadValue:
     return BadValue(f"there is no module {missing}{hint}", path, quoted(found))
 
 
-def _of_class(form: str, path: str) -> ComponentType:
+def _of_class(type_name: str, path: str) -> ComponentType:
     """Return the component type that `module:Class` registered."""
     made, module = class_at(path), path.partition(":")[0]
-    of_form = [one for one in _known.values() if one.type_name == form]
-    for one in of_form:
+    of_type = [one for one in _known.values() if one.type_name == type_name]
+    for one in of_type:
         if one.factory is made:
             return one
-    there = sorted(one.factory.__qualname__ for one in of_form if one.module == module)
+    there = sorted(one.factory.__qualname__ for one in of_type if one.module == module)
     hint = f"; {module} registers {', '.join(there)}" if there else ""
-    raise BadValue(f"not registered as {with_article(word_of(form))}{hint}", path)
+    raise BadValue(f"not registered as {with_article(word_of(type_name))}{hint}", path)
 
 
 def _forget_new(known: Mapping[tuple[str, str], ComponentType]) -> None:

@@ -79,7 +79,7 @@ class _Group:
     members: list[Any]
     made: Any
     size: int
-    form: str
+    type_name: str
     what: str
     is_last: bool
 
@@ -90,18 +90,20 @@ class _Group:
         if not len(rows):
             return None
         its = there[rows].tolist()
-        what = _names(self.form, fitted, its)
+        what = _names(self.type_name, fitted, its)
         made = some_together(what, tick, self.made, self.members, rows)
-        return _Group(its, [self.members[row] for row in rows.tolist()], made, self.size, self.form, what, self.is_last)
+        return _Group(
+            its, [self.members[row] for row in rows.tolist()], made, self.size, self.type_name, what, self.is_last
+        )
 
 
 _Divided: TypeAlias = tuple[list[_Group], list[int]]
 """Groups, and the places of the sensors that work alone, or whose modifier does."""
 
 
-def _names(form: str, fitted: Sequence[BoundSensor], places: Sequence[int]) -> str:
+def _names(type_name: str, fitted: Sequence[BoundSensor], places: Sequence[int]) -> str:
     names = ", ".join([f"{fitted[place].channel} of {fitted[place].robot}" for place in places[:NAMED_MAX]])
-    return f"{form} {names}{', ...' * (len(places) > NAMED_MAX)}"
+    return f"{type_name} {names}{', ...' * (len(places) > NAMED_MAX)}"
 
 
 class Plan:
@@ -143,7 +145,7 @@ class Plan:
         members = [(place, one.modifiers[depth].modifier, one.size) for place, one in having]
         return self._divided(members, "modifier", MODIFIED_TOGETHER_MIN, tick)
 
-    def _divided(self, members: Sequence[tuple[int, Any, int]], form: str, least: int, tick: int) -> _Divided:
+    def _divided(self, members: Sequence[tuple[int, Any, int]], type_name: str, least: int, tick: int) -> _Divided:
         """Divide (place, object, numbers) into groups of a class and a length, and the places of those without one.
 
         A group of one, and a group of less than `least` numbers, is computed one after the other, with the same bits.
@@ -153,14 +155,14 @@ class Plan:
             kinds.setdefault((type(one), size), []).append((place, one))
         alone, groups = [], []
         for (kind, size), its in kinds.items():
-            if len(its) == 1 or len(its) * size < max(1, least) or not has_together(kind, METHODS[form]):
+            if len(its) == 1 or len(its) * size < max(1, least) or not has_together(kind, METHODS[type_name]):
                 alone += [place for place, _ in its]
                 continue
             places, ones = [place for place, _ in its], [one for _, one in its]
-            what = _names(form, self._fitted, places)
+            what = _names(type_name, self._fitted, places)
             is_last = not any(self._fitted[place].modifiers for place in places)
             made: Any = called(what, "", tick, kind.together, ones)
-            groups.append(_Group(places, ones, made, size, form, what, is_last))
+            groups.append(_Group(places, ones, made, size, type_name, what, is_last))
         return groups, sorted(alone)
 
     def sample(self, view: SensingView) -> list[bytes | None]:

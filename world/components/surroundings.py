@@ -1,4 +1,4 @@
-"""The surroundings of forms: poses of links, near entities, rays, tags, contacts.
+"""The surroundings of components: poses of links, near entities, rays, tags, contacts.
 
 All of it follows from the frame; entities are in name order.
 """

@@ -1,4 +1,4 @@
-"""Guarded forms: a line of theirs that changes a number of the frame without `view.write` raises.
+"""Guarded components: a line of theirs that changes a number of the frame without `view.write` raises.
 
 Checks of components and trials use guards; a run does not, since a guard costs more than most components.
 """

@@ -15,7 +15,7 @@ import pytest
 from foosim.simulation.run import rehearse
 from tests.own_components import folder_on_path
 
-FORMS: Final = """
+COMPONENTS: Final = """
 import sys
 from msgspec import Struct
 from foosim import Player
@@ -98,10 +98,10 @@ substeps: 1
 engine: pure
 pace: fast
 robots:
-  alpha: {model: 'hub_forms:Post', sensors: {beam: {kind: 'hub_forms:Beam', rate: 50 Hz}}}
-  beta: {model: 'hub_forms:Post', x: 5.0}
+  alpha: {model: 'hub_components:Post', sensors: {beam: {kind: 'hub_components:Beam', rate: 50 Hz}}}
+  beta: {model: 'hub_components:Post', x: 5.0}
 nodes: {one: {robots: ['*']}}
-players: {looker: {class: 'hub_forms:Looker', rate: 50 Hz, robots: {alpha: [beam]}}}
+players: {looker: {class: 'hub_components:Looker', rate: 50 Hz, robots: {alpha: [beam]}}}
 network:
   radios: {air: {preset: wifi_5_indoor}}
   robots: {'*': [air], looker: [air]}
@@ -109,29 +109,29 @@ network:
 """
 
 
-SAID: Final = "model hub_post of beta failed at tick 0: {} (hub_forms.py:"
+SAID: Final = "model hub_post of beta failed at tick 0: {} (hub_components.py:"
 
 
 @pytest.fixture
-def forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    (tmp_path / "hub_forms.py").write_text(FORMS)
+def components(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    (tmp_path / "hub_components.py").write_text(COMPONENTS)
     folder_on_path(tmp_path, monkeypatch)
-    yield import_module("hub_forms")
-    sys.modules.pop("hub_forms")
+    yield import_module("hub_components")
+    sys.modules.pop("hub_components")
 
 
 @pytest.mark.parametrize(
     ("act", "said"), [("raises", "ValueError: no file here"), ("leaves", "SystemExit: 0")], ids=["raises", "leaves"]
 )
-def test_a_body_that_fails_in_the_vhub_ends_a_rehearsal_in_order(forms: Any, act: str, said: str) -> None:
+def test_a_body_that_fails_in_the_vhub_ends_a_rehearsal_in_order(components: Any, act: str, said: str) -> None:
     """As one does that reads what is missing on the vHub's machine."""
     assert not rehearse(YARD, "posts.yaml", 50, 2).json["failed"]
-    forms.acts["beta"] = getattr(forms, act)
+    components.acts["beta"] = getattr(components, act)
     done = rehearse(YARD, "posts.yaml", 50, 2).json
     assert done["failed"] and done["reason"].startswith(SAID.format(said))
-    form = done["failed_form"]
-    assert (form["entity"], form["component"]) == ("beta", "model hub_post")
-    assert form["traceback"].startswith("Traceback")
+    failed = done["failed_component"]
+    assert (failed["entity"], failed["component"]) == ("beta", "model hub_post")
+    assert failed["traceback"].startswith("Traceback")
 
 
 @pytest.mark.parametrize(
@@ -141,14 +141,14 @@ def test_a_body_that_fails_in_the_vhub_ends_a_rehearsal_in_order(forms: Any, act
         (
             "{'beta': raises, 'trial': True}",
             "lost vhub: the deployment is not valid on its machine: posts.yaml:15:3: robots: model hub_post of beta "
-            "failed at tick 0: ValueError: no file here (hub_forms.py:",
+            "failed at tick 0: ValueError: no file here (hub_components.py:",
         ),
     ],
     ids=["in the run", "where it reads the deployment"],
 )
 def test_a_body_that_fails_in_the_vhubs_process_ends_the_run_at_once(tmp_path: Path, acts: str, said: str) -> None:
     """Of the capture, which draws it, where there are no radios."""
-    (tmp_path / "hub_forms.py").write_text(f"{FORMS}\nacts.update({acts})\n")
+    (tmp_path / "hub_components.py").write_text(f"{COMPONENTS}\nacts.update({acts})\n")
     (tmp_path / "posts.yaml").write_text(YARD.partition("network:")[0])
     command = [sys.executable, "-P", "-c", "from foosim.cli import main; main()"]
     done = subprocess.run(

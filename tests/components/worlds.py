@@ -138,13 +138,13 @@ def still(deployment: Deployment, frames: Sequence[Frame]) -> set[str]:
 
 
 class World(NamedTuple):
-    """The plain data of a deployment, and the place of the form's settings in it; no place: it has none."""
+    """The plain data of a deployment, and the place of the component's settings in it; no place: it has none."""
 
     data: dict[str, Any]
     place: Place = ()
 
     def text(self, *changes: tuple[Place, Any]) -> str:
-        """Return the deployment's text, with settings changed below the place of the form's."""
+        """Return the deployment's text, with settings changed below the place of the component's."""
         return write_yaml(_with(self.data, [((*self.place, *path), value) for path, value in changes]))
 
     def with_(self, path: Place, value: Any, place: Place | None = None) -> World:

@@ -1,6 +1,6 @@
-"""Each of foosim's forms in the worlds of tests/whole_worlds.py: its settings beyond their limits.
+"""Each of foosim's component types in the worlds of tests/whole_worlds.py: its settings beyond their limits.
 
-`make forms` has the long part: the laws over thousands of ticks by several seeds, and runs with settings at their
+`make components` has the long part: the laws over thousands of ticks by several seeds, and runs with settings at their
 limits. `make test` has the laws in tests/laws/test_one_world.py.
 """
 
@@ -25,8 +25,8 @@ from foosim.simulation.check.component_check import ComponentCheck
 from foosim.simulation.run import rehearse
 from foosim.world.component_types import registry
 from foosim.world.component_types.descriptions import ComponentType
-from foosim.world.component_types.registry import FORMS
-from tests.forms.worlds import DEPLOY, HALL, SCENE, TABLE, Place, World, scene
+from foosim.world.component_types.registry import TYPE_NAMES
+from tests.components.worlds import DEPLOY, HALL, SCENE, TABLE, Place, World, scene
 from tests.frames import broken_laws
 from tests.whole_worlds import NAME, assets, mixed, written, yard
 
@@ -59,8 +59,8 @@ class Edge(NamedTuple):
 
 @cache
 def own() -> list[Key]:
-    found = [registry.find(form, name) for form in FORMS for name in registry.names(form)]
-    return sorted((form.type_name, form.name) for form in found if form.is_own)
+    found = [registry.find(type_name, name) for type_name in TYPE_NAMES for name in registry.names(type_name)]
+    return sorted((one.type_name, one.name) for one in found if one.is_own)
 
 
 @cache
@@ -104,9 +104,9 @@ def section(data: Mapping[str, Any], place: Place) -> Any:
     return found
 
 
-def edges(form: ComponentType, data: Mapping[str, Any], place: Place) -> Iterator[Edge]:
+def edges(component_type: ComponentType, data: Mapping[str, Any], place: Place) -> Iterator[Edge]:
     """Yield the limits of each of a component's settings that has any, and what lies just beyond."""
-    for count, setting in enumerate(as_json(form)["settings"]):
+    for count, setting in enumerate(as_json(component_type)["settings"]):
         at = (*place, *_placed(setting["key"].split("."), section(data, place)))
         quantity, number = QUANTITY.fullmatch(setting["value"]), NUMBER.fullmatch(setting["value"])
         if quantity is not None:
