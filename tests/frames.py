@@ -40,5 +40,5 @@ def rows_of(closings: Sequence[Closing], deployment: Deployment, *without: str) 
 
 
 def broken_laws(text: str, name: str, ticks: int, seed: int = 1) -> Iterator[str]:
-    """Yield which laws a deployment's forms break, in words, as each is found."""
+    """Yield which laws a deployment's components break, in words, as each is found."""
     yield from ComponentCheck(text, name, ticks, seed).broken()

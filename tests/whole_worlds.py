@@ -1,8 +1,8 @@
-"""Worlds of many forms together: what one engine can have beside one another, all at once.
+"""Worlds of many component types together: what one engine can have beside one another, all at once.
 
 `mixed` is a football table in a hall with rovers and what moves by kinematics; `yard` has rigid bodies of all kinds,
-robots from files, grippers, heads, jobs, boxes of a scene and what comes and goes. Together they have every form but
-engines and scenes, of which a world has one.
+robots from files, grippers, heads, jobs, boxes of a scene and what comes and goes. They have all component types
+but scenes, of which a world has one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The commands `components` and `schema`: what they tell of each form, and that nothing else is in their output."""
+"""The commands `components` and `schema`: each component type, and nothing else in their output."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_a_form_is_told_of_with_what_it_brings(told: Telling, about: tuple[str, 
 def test_all_are_told_of_in_json(told: Telling) -> None:
     found: list[dict[str, Any]] = json.loads(told("components", "--json")[0])["components"]
     assert [(one["type"], one["name"]) for one in found] == [
-        (form, name) for form in TYPE_NAMES for name in names(form)
+        (type_name, name) for type_name in TYPE_NAMES for name in names(type_name)
     ]
     by_name = {(one["type"], one["name"]): one for one in found}
     rover, football = by_name["model", "rover"], by_name["rule", "football"]

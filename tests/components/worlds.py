@@ -148,7 +148,7 @@ class World(NamedTuple):
         return write_yaml(_with(self.data, [((*self.place, *path), value) for path, value in changes]))
 
     def with_(self, path: Place, value: Any, place: Place | None = None) -> World:
-        """Return the world with a value at a path from its root, which is where the form's settings are."""
+        """Return the world with a value at a path from its root, the place of the component's settings."""
         return World(_with(self.data, [(path, value)]), path if place is None else place)
 
 

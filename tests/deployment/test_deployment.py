@@ -169,10 +169,10 @@ def test_settings_know_their_component_type_and_so_do_copies(name: str) -> None:
             model = find_model(robot.model).variant(getattr(robot, "dynamics", None))
             assert robot.model_copy(update={"spare": True}).component_type is robot.component_type is model
             typed += [("entity_rule", rule) for rule in robot.rules.values()]
-            for form, components in (("sensor", robot.sensors), ("actuator", robot.actuators)):
-                typed += [(form, its) for its in components.values()]
+            for type_name, components in (("sensor", robot.sensors), ("actuator", robot.actuators)):
+                typed += [(type_name, its) for its in components.values()]
                 typed += [("modifier", modifier) for its in components.values() for modifier in its.modifiers]
-        assert typed and all(its.component_type is find(form, its.kind) for form, its in typed)
+        assert typed and all(its.component_type is find(type_name, its.kind) for type_name, its in typed)
 
 
 def test_values_do_not_change(table: Deployment) -> None:

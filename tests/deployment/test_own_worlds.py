@@ -1,4 +1,4 @@
-"""Worlds of somebody's own forms that cannot be: refused with the place and what is valid, before a run begins."""
+"""Wrong worlds of components of other packages are refused with the place and what is valid."""
 
 from __future__ import annotations
 
@@ -95,9 +95,9 @@ def test_modifiers_of_like_names_have_labels_of_their_own(site: Path) -> None:
 DRONE: Final = "robots.camera={model: 'own_form:Own'}"
 
 
-def installed(form: str) -> str:
-    """The names of a form, as messages list them."""
-    return ", ".join(registry.names(form))
+def installed(type_name: str) -> str:
+    """The names of a component type, as messages list them."""
+    return ", ".join(registry.names(type_name))
 
 
 OF_ENTITY: Final = ("class Own(EntityRule):", "    def __init__(self, *made_with): pass", "")
@@ -241,7 +241,7 @@ def test_a_kit_that_fails_is_named_with_the_place_in_its_file(site: Path, line: 
     assert "__init__" in told or re.search(r"\(own_form\.py:\d+\)", told), told
 
 
-# --- what a form of one world says of another ------------------------------------------------------------------------
+# --- components of one world in another ------------------------------------------------------------------------
 
 
 def test_free_bodies_are_not_those_of_kits_alone(site: Path, fleet_text: Callable[..., str]) -> None:

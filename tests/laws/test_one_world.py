@@ -1,8 +1,8 @@
 """Laws 1 and 3 over whole worlds: nodes, owners, moves, engines made anew, losses and a bad bus change nothing.
 
-The four deployments, the workshop, the swarm's living world, and worlds that hold every form beside one another. A run
-on one node is compared with a run on three whose processes die; that one's capture with the world simulated again, from
-its start and from frames within, and with its packets judged again; and the run with a `Simulation`.
+The four deployments, the workshop, the swarm's living world, and worlds with every component type. A run on one node is
+compared with a run on three whose processes die; that one's capture with the world simulated again, from its start and
+from frames within, and with its packets judged again; and the run with a `Simulation`.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def test_on_many_nodes_without_losses() -> None:
         assert run(world_of(name), 8, PATIENT).digests == alone(name).digests, name
 
 
-# --- every form ------------------------------------------------------------------------------------------------------
+# --- every component type ------------------------------------------------------------------------------------------
 
 WHOLE: Final = ("mixed", "everything")
 
@@ -230,7 +230,7 @@ WHOLE: Final = ("mixed", "everything")
 def test_every_form_is_in_a_world_of_all_or_has_its_laws_tested_alone() -> None:
     used: set[tuple[str, str]] = set()
     for name in WHOLE:
-        used |= {(form.type_name, form.name) for form in component_types_of(loaded(name))}
+        used |= {(one.type_name, one.name) for one in component_types_of(loaded(name))}
     assert set(own()) - used == {*ALONE}
 
 

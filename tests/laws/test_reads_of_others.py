@@ -1,6 +1,6 @@
-"""What a form reads of another entity is that of the start of the tick, whichever nodes compute the two.
+"""What a component reads of another entity is that of the start of the tick, whichever nodes compute the two.
 
-Law 1 for forms that read others in every part of a tick, and that a name that is free again is another entity's.
+Law 1 for components that read others in every part of a tick, and that a name that is free again is another entity's.
 """
 
 from __future__ import annotations

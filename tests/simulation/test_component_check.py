@@ -1,4 +1,4 @@
-"""The check of a form's laws: what obeys them passes, and each way to break them is found and named."""
+"""The check of a component's laws: what obeys them passes, and each way to break them is found and named."""
 
 from __future__ import annotations
 

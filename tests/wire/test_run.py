@@ -446,7 +446,7 @@ SCALED: Final = DOZES.replace("import time", "import time, factor").replace("Not
 
 
 def test_a_node_with_another_source_of_a_form_is_refused(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a module that the form's own module imports; the node with the same source takes part."""
+    """Of a module that the component's own module imports; the node with the same source takes part."""
     other = house.folder / "other"
     other.mkdir()
     for folder, number in ((house.folder, 1.0), (other, 2.0)):

@@ -33,7 +33,9 @@ from tests.deployed import DEPLOYMENT, TABLE
 
 ENCODER = CommandEncoder(DEPLOYMENT)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
-CODECS = {name: codec_of(find_component(form, name)) for form in ("sensor", "actuator") for name in names(form)}
+CODECS = {
+    name: codec_of(find_component(type_name, name)) for type_name in ("sensor", "actuator") for name in names(type_name)
+}
 """Of each registered kind."""
 PLAIN = {"joint_trajectory"}
 """Kinds that are MessagePack."""
@@ -245,8 +247,8 @@ def test_joints_are_commanded_by_name_or_in_their_order(
 ) -> None:
     named = dict(zip(("shoulder", "elbow"), reach, strict=True))
     sent = [("reach", np.array(reach).tobytes()), ("turn", np.array([turn]).tobytes())]
-    forms: list[Any] = [reach, named, {"positions": reach}, (reach,), JointPositions(reach), np.array(reach)]
-    for command in forms:
+    commands: list[Any] = [reach, named, {"positions": reach}, (reach,), JointPositions(reach), np.array(reach)]
+    for command in commands:
         assert arm.encode("arm", {"turn": {"wrist": turn}, "reach": command}) == sent
         assert arm.encode("arm", {"reach": command}) == sent[:1]
     assert arm.encode("arm", {"turn": [turn], "reach": JointPositions(reach)}) == sent

@@ -1,4 +1,4 @@
-"""What a form says of itself is checked when it registers itself: refused with its name, its module and its place."""
+"""A component is checked when it is registered: refused with its name, its module and its place."""
 
 from __future__ import annotations
 
@@ -53,27 +53,32 @@ REFUSED: Final = {
 @pytest.mark.parametrize("registration", REFUSED)
 def test_a_registration_that_cannot_be_is_refused_with_name_module_and_place(site: Path, registration: str) -> None:
     path = written(site, f"{registration}(Own)")
-    form = registration.partition("(")[0]
+    type_name = registration.partition("(")[0]
     line = len(path.read_text().splitlines())
     with pytest.raises(BadValue) as error:
-        find(form, "own_form:Own")
+        find(type_name, "own_form:Own")
     found = error.value.problem
-    word = "rule of worlds" if form == "rule" else form
+    word = "rule of worlds" if type_name == "rule" else type_name
     assert found.startswith("cannot be imported: Refused: ") and REFUSED[registration] in found, found
     assert f"{word} own of own_form: " in found or "own_form registers" in found
     assert found.endswith(f" (own_form.py:{line})")
-    assert registry.lookup(form, "own") is None
+    assert registry.lookup(type_name, "own") is None
 
 
 SETTINGS: Final = {"kit": "SpecBase", "model": "RobotSettings"}
 
 
-@pytest.mark.parametrize("form", ["sensor", "actuator", "modifier", "model", "rule", "kit"])
-def test_a_class_of_another_type_is_refused(site: Path, form: str) -> None:
-    value = ", Number" if form in ("sensor", "actuator") else ""
-    written(site, "class Bare: pass", f"{form}('own', {SETTINGS.get(form, form.title() + 'Settings')}{value})(Bare)")
-    with pytest.raises(BadValue, match=f"the class Bare is not derived from {form.title()} of foosim.components"):
-        find(form, "own_form:Bare")
+@pytest.mark.parametrize("type_name", ["sensor", "actuator", "modifier", "model", "rule", "kit"])
+def test_a_class_of_another_type_is_refused(site: Path, type_name: str) -> None:
+    value = ", Number" if type_name in ("sensor", "actuator") else ""
+    settings = SETTINGS.get(type_name, f"{type_name.title()}Settings")
+    written(
+        site,
+        "class Bare: pass",
+        f"{type_name}('own', {settings}{value})(Bare)",
+    )
+    with pytest.raises(BadValue, match=f"the class Bare is not derived from {type_name.title()} of foosim.components"):
+        find(type_name, "own_form:Bare")
 
 
 # --- slots that follow from settings ---------------------------------------------------------------------------------

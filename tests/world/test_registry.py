@@ -157,8 +157,8 @@ MODULES: Final = {
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder on the path with modules of somebody's own."""
-    for form in TYPE_NAMES:
-        names(form)
+    for type_name in TYPE_NAMES:
+        names(type_name)
     folder = tmp_path / "site"
     folder.mkdir()
     (folder / "own_package").mkdir()
@@ -173,9 +173,9 @@ import json, sys
 from foosim.common.errors import Refused
 from foosim.world.component_types.registry import find, names
 
-def said(form, kind):
+def said(type_name, kind):
     try:
-        return find(form, kind).module
+        return find(type_name, kind).module
     except Refused as error:
         return f"{type(error).__name__}: {error}"
 
@@ -189,13 +189,13 @@ def printed(code: str, folder: Path | None = None) -> Any:
 # --- foosim's own ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("form", TYPE_NAMES)
-def test_each_is_in_a_module_of_its_name_and_has_a_summary(form: str) -> None:
-    for name in names(form):
-        component = find(form, name)
-        assert (component.type_name, component.name, component.module.rpartition(".")[2]) == (form, name, name)
+@pytest.mark.parametrize("type_name", TYPE_NAMES)
+def test_each_is_in_a_module_of_its_name_and_has_a_summary(type_name: str) -> None:
+    for name in names(type_name):
+        component = find(type_name, name)
+        assert (component.type_name, component.name, component.module.rpartition(".")[2]) == (type_name, name, name)
         assert component.summary.endswith(".")
-        assert find(form, f"{component.module}:{component.factory.__qualname__}") is component
+        assert find(type_name, f"{component.module}:{component.factory.__qualname__}") is component
 
 
 def test_finding_one_imports_its_module_only() -> None:
@@ -209,7 +209,7 @@ print(json.dumps([found, modules, "numpy" in sys.modules]))
 
 
 @pytest.mark.parametrize(
-    ("form", "kind", "nearest"),
+    ("type_name", "kind", "nearest"),
     [
         ("sensor", "encodr", ", nearest is 'encoder'"),
         ("sensor", "Pose", ", nearest is 'pose'"),
@@ -221,11 +221,11 @@ print(json.dumps([found, modules, "numpy" in sys.modules]))
         ("actuator", "wheel_speed", ", nearest is 'wheel_speeds'"),
     ],
 )
-def test_an_unknown_name_is_refused_with_the_names_and_the_nearest(form: str, kind: str, nearest: str) -> None:
+def test_an_unknown_name_is_refused_with_the_names_and_the_nearest(type_name: str, kind: str, nearest: str) -> None:
     with pytest.raises(UnknownName) as error:
-        find(form, kind)
-    there = ", ".join(names(form))
-    assert str(error.value) == f"unknown {form} (there are: {there}, or any module:Class), {kind!r}{nearest}"
+        find(type_name, kind)
+    there = ", ".join(names(type_name))
+    assert str(error.value) == f"unknown {type_name} (there are: {there}, or any module:Class), {kind!r}{nearest}"
 
 
 # --- by module and class ---------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The version of a form follows all sources that it is made of, and no others."""
+"""The version of a component follows all sources that it is made of, and no others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What forms see around them: poses of links, who is near, tags, contacts; and references to entities in slots."""
+"""What components see around them: poses of links, who is near, tags, contacts; and references to entities in slots."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ SENSOR: Final = {"kind": "own_forms:Places", "rate": "50 Hz", "modifiers": [{"ki
 
 
 def own_world() -> World:
-    """A hall with rovers, and all of somebody's own forms."""
+    """A hall with rovers, and all of own components."""
     world = HALL.with_(("robots", "mover"), {"model": "own_forms:Moves"}, ())
     world = world.with_(("robots", "mover", "sensors"), {"places": SENSOR}, ())
     world = world.with_(("robots", "mover", "rules"), {"wears": {"kind": "own_forms:Wears"}}, ())
@@ -343,12 +343,12 @@ def test_a_misdeed_at_any_tick_ends_the_run_with_its_name_its_tick_and_its_line(
     logged: list[str] = []
     settings = Settings(on_log=lambda process, level, text: logged.append(text) if process == "supervisor" else None)
     done = rehearse(own_world().text(), NAME, 30, 2, settings=settings).json
-    name, form = AT_TICKS[component, method], done["failed_component"]
+    name, failed = AT_TICKS[component, method], done["failed_component"]
     found = re.search(rf"{name}.* failed at tick (\d+): .*{re.escape(MISDEEDS[line])}", done["reason"])
-    assert done["failed"] and found is not None and TICK <= int(found[1]) == form["tick"] <= TICK + 5, done["reason"]
-    assert any(form["traceback"] in text for text in logged)
+    assert done["failed"] and found is not None and TICK <= int(found[1]) == failed["tick"] <= TICK + 5, done["reason"]
+    assert any(failed["traceback"] in text for text in logged)
     if not line.startswith("return"):
-        assert f"(own_forms.py:{number})" in done["reason"] and form["traceback"].startswith("Traceback")
+        assert f"(own_forms.py:{number})" in done["reason"] and failed["traceback"].startswith("Traceback")
 
 
 @pytest.mark.parametrize(("component", "method"), [key for key in AT_TICKS if key[0] != "Slides"])

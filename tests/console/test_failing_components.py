@@ -89,7 +89,7 @@ RAY: Final = [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
 
 
 @pytest.fixture
-def forms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+def components(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     (tmp_path / "shown_forms.py").write_text(FORMS)
     folder_on_path(tmp_path, monkeypatch)
     module = import_module("shown_forms")
@@ -109,7 +109,7 @@ def deployment() -> Any:
 
 ACT: Final = line_of("raise ValueError")
 Act = str | Callable[[], Any]
-"""What a form does: it raises, or gives what this gives."""
+"""What a component does: it raises, or gives what this gives."""
 
 
 @pytest.mark.parametrize(
@@ -127,8 +127,8 @@ Act = str | Callable[[], Any]
         ),
     ],
 )
-def test_rays_that_fail_are_named_once_and_the_others_drawn(forms: Any, act: Act, said: str) -> None:
-    forms.acts["red.goal"] = act
+def test_rays_that_fail_are_named_once_and_the_others_drawn(components: Any, act: Act, said: str) -> None:
+    components.acts["red.goal"] = act
     frame = initial_frame(deployment())
     drawing = Drawing(deployment())
     content, note = drawing.overlays(frame, {"rays", "contacts"})
@@ -153,7 +153,7 @@ def marks(tick: int, events: WorldEvents, frame: Frame) -> list[Mark]:
         (lambda: (1.5, "tells", "x"), "marks() returned (1.5, 'tells', 'x'); expected a mark (tick, kind, text) {}"),
     ],
 )
-def test_marks_that_fail_are_a_mark_and_the_others_told(forms: Any, name: str, act: Act, said: str) -> None:
+def test_marks_that_fail_are_a_mark_and_the_others_told(components: Any, name: str, act: Act, said: str) -> None:
     found = deployment()
     frame, events = initial_frame(found), WorldEvents(found)
     every = [
@@ -162,7 +162,7 @@ def test_marks_that_fail_are_a_mark_and_the_others_told(forms: Any, name: str, a
         Mark(2, "wears", "red.goal wears"),
     ]
     assert marks(1, events, frame) == [] and sorted(marks(2, events, frame), key=str) == every
-    forms.acts[name] = act
+    components.acts[name] = act
     told = marks(3, events, frame)
     (failed,) = [mark for mark in told if mark.kind == FAILED]
     place = line_of("def marks(" if name == "rule" else "def __init__(self, settings, at):")
