@@ -105,7 +105,7 @@ def run_roles(  # noqa: PLR0913  # what the command was given
         shell, simulation, credentials = None, None, None
         here = ([VHUB] if vhub is not None else []) + [identity.node(node) for node in nodes]
         if supervisor is not None:
-            shell = opened.enter_context(_supervisor(process, *supervisor, pki, is_launched))
+            shell = opened.enter_context(_supervisor(process, *supervisor, pki, is_launched or count > 1))
             simulation = shell.session
         elif here:
             own_name = identity.process(name) if len(here) > 1 else here[0]

@@ -358,7 +358,8 @@ class System:
         actions.clear()
         if process.core is self.supervisor and self._frames:
             self._report_commits(was_cut=left is not None)
-        if process.core is self.hub and self.hub.finished and process.name in self.processes:
+        hub_ends = process.core is self.hub and self.hub.finished and not self.hub.is_closing
+        if hub_ends and process.name in self.processes:
             self._close(process, leaves_ns)
 
     def _close(self, process: Process, begun_ns: int) -> None:

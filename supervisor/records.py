@@ -253,8 +253,10 @@ def fold(deployment: Deployment, records: Iterable[bytes]) -> History:
     if kept is None:
         raise Malformed("a journal of the supervisor without a record")
     frame = first_frame(deployment, kept.run.start)
-    if kept.commits:
-        frame = committed_frame(decode(Commit, kept.commits[-1]), frame.layout)
+    if kept.epoch:
+        decode(Epoch, kept.epoch)
+    if commits := [decode(Commit, commit) for commit in kept.commits]:
+        frame = committed_frame(commits[-1], frame.layout)
     return History(kept, frame)
 
 

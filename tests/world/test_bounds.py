@@ -24,7 +24,7 @@ class Mixed(Struct, frozen=True):
 
 
 class Limited(Actuator):
-    def __init__(self, **limits: tuple[float, float]) -> None:
+    def __init__(self, limits: dict[str, tuple[float, float]], at: None) -> None:
         self._limits = limits
 
     def limits(self) -> dict[str, tuple[float, float]]:
@@ -36,13 +36,13 @@ class Limited(Actuator):
 
 @pytest.mark.parametrize("number", [nan, inf, -inf])
 def test_what_a_modifier_makes_infinite_is_refused(number: float) -> None:
-    bounds = CommandBounds(Limited(slide=(-1.0, 1.0), spin=(-2.0, 2.0)), PayloadCodec(Speeds, "speeds"))
+    bounds = CommandBounds(Limited({"slide": (-1.0, 1.0), "spin": (-2.0, 2.0)}, None), PayloadCodec(Speeds, "speeds"))
     assert bounds.clamp(Speeds(0.0, number)) is None
     assert bounds.clamp(Speeds(3.0, -5.0)) == (Speeds(1.0, -2.0), [("slide", "", 3.0, 1.0), ("spin", "", -5.0, -2.0)])
 
 
 def test_fields_of_any_type_are_clamped_and_keep_it() -> None:
-    bounds = CommandBounds(Limited(count=(0.0, 5.0), speeds=(-1.0, 1.0)), PayloadCodec(Mixed, "mixed"))
+    bounds = CommandBounds(Limited({"count": (0.0, 5.0), "speeds": (-1.0, 1.0)}, None), PayloadCodec(Mixed, "mixed"))
     free = Mixed("go", None, (0.5, -0.5))
     assert bounds.clamp(free) == (free, ())
     found = bounds.clamp(Mixed("go", 9, (0.5, -4.0)))

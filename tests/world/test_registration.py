@@ -72,13 +72,25 @@ SETTINGS: Final = {"kit": "SpecBase", "model": "RobotSettings"}
 def test_a_class_of_another_type_is_refused(site: Path, type_name: str) -> None:
     value = ", Number" if type_name in ("sensor", "actuator") else ""
     settings = SETTINGS.get(type_name, f"{type_name.title()}Settings")
-    written(
-        site,
-        "class Bare: pass",
-        f"{type_name}('own', {settings}{value})(Bare)",
-    )
+    written(site, "class Bare: pass", f"{type_name}('own', {settings}{value})(Bare)")
     with pytest.raises(BadValue, match=f"the class Bare is not derived from {type_name.title()} of foosim.components"):
         find(type_name, "own_form:Bare")
+
+
+MISPLACED: Final = {
+    "Model, a = slot(), model('own', RobotSettings)": "the slots of a model are slots= of its registration",
+    "Sensor, a = slot(shared=True), sensor('own', Settings, Number)": "slot(shared=True) is valid in rules of entities",
+    "Rule, a = need(), rule('own', RuleSettings)": "need() is valid in components of entities only",
+}
+
+
+@pytest.mark.parametrize("declared", MISPLACED)
+def test_a_declaration_that_the_type_has_no_use_for_is_refused(site: Path, declared: str) -> None:
+    base, line, registration = declared.split(", ", 2)
+    written(site, f"class Kept({base}):", f"    {line}", f"{registration}(Kept)")
+    with pytest.raises(BadValue) as error:
+        find(registration.partition("(")[0], "own_form:Kept")
+    assert " own of own_form: " in error.value.problem and MISPLACED[declared] in error.value.problem
 
 
 # --- slots that follow from settings ---------------------------------------------------------------------------------

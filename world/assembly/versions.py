@@ -1,4 +1,4 @@
-"""The component types of a world, and the versions of components of other packages.
+"""The component types of a world, and the versions of those of other packages.
 
 Two nodes with different versions of a component would compute different worlds, and a capture is only repeated by the
 version of its run.
@@ -10,13 +10,14 @@ that one within a function counts.
 
 from __future__ import annotations
 
+import ast
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from hashlib import blake2b
-from importlib.machinery import PathFinder, SourceFileLoader
-from modulefinder import ModuleFinder
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec, resolve_name
 from typing import Any, Final
 
 from foosim.world.component_types import registry
@@ -27,8 +28,6 @@ from foosim.world.layout import spares_of
 from foosim.world.spec import WorldSpec
 
 DIGEST_BYTES: Final = 8
-PACKAGE: Final = 5
-"""The kind of a package in `modulefinder`."""
 
 
 def component_types_of(spec: WorldSpec) -> list[ComponentType]:
@@ -84,54 +83,92 @@ def _version(made: Callable[..., Any]) -> str:
 
 
 def sources_of(made: Any) -> dict[str, bytes]:
-    """Return the files of a component's class and its base classes, and of what they import of their own, by module."""
+    """Return the sources of a component, by module: text, or the bytes of a compiled module."""
+    bases = [base.__module__ for base in getattr(made, "__mro__", ())]
+    modules = [module for module in (made.__module__, *bases) if _is_foreign(module)]
     found: dict[str, bytes] = {}
-    for module in dict.fromkeys(base.__module__ for base in getattr(made, "__mro__", (made,))):
-        if _top(module) not in (OURS, *sys.stdlib_module_names, "__main__") and module not in found:
-            found |= _Imports(module).sources()
+    waiting = list(dict.fromkeys(modules))
+    while waiting:
+        module = waiting.pop()
+        if module in found:
+            continue
+        found[module] = _source(module)
+        waiting += [other for other in _imports(module) if other not in found and _belongs(other, module)]
     return dict(sorted(found.items()))
+
+
+def _is_foreign(module: str) -> bool:
+    return _top(module) not in (OURS, *sys.stdlib_module_names, "__main__")
 
 
 def _top(module: str) -> str:
     return module.partition(".")[0]
 
 
-class _Imports(ModuleFinder):
-    """The modules that a module may import of its top-level package, and of its folder outside of the libraries."""
+@cache
+def _spec(module: str) -> ModuleSpec | None:
+    with suppress(Exception):  # a parent without submodules, a module without a spec
+        return find_spec(module)
+    return None
 
-    def __init__(self, module: str) -> None:
-        top = sys.modules[_top(module)]
-        self._module = module
-        folder = [*getattr(top, "__path__", ()), top.__file__ or ""][0].rpartition("/")[0]
-        self._is_library = in_library(f"{folder}/")
-        super().__init__(path=[folder], excludes=[OURS, *sys.stdlib_module_names])
-        with suppress(ImportError):  # of an editable install: it is found in another way than by its folder
-            self.import_hook(module)
 
-    def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
-        """Find a module: a namespace is a package without a file, which the base class does not know."""
-        spec = PathFinder.find_spec(name, path or self.path)
-        if spec is None or spec.loader is not None or not spec.submodule_search_locations:
-            return super().find_module(name, path, parent)
-        return None, next(iter(spec.submodule_search_locations)), ("", "", PACKAGE)
+@cache
+def _source(module: str) -> bytes:
+    """Return the source of a module, or the bytes of its file without source; nothing of a namespace."""
+    spec = _spec(module)
+    loader: Any = None if spec is None else spec.loader
+    text = None
+    with suppress(Exception):  # a loader may raise anything
+        text = loader.get_source(module)
+    if text is not None:
+        return str(text).encode()
+    with suppress(Exception):
+        return bytes(loader.get_data(spec.origin if spec is not None else ""))
+    return b""
 
-    def load_package(self, fqname: str, pathname: str) -> Any:
-        """Load a package; a namespace has no file."""
-        try:
-            return super().load_package(fqname, pathname)
-        except ImportError:
-            found: Any = self.modules[fqname]
-            found.__file__ = None
-            return found
 
-    def import_module(self, partname: str, fqname: str, parent: Any) -> Any:
-        """Find a module of its own; None for any other."""
-        if self._is_library and _top(fqname) != _top(self._module):
-            return None
-        return super().import_module(partname, fqname, parent)
+@cache
+def _imports(module: str) -> tuple[str, ...]:
+    """Return the modules that one may import, and the packages that it is in."""
+    spec = _spec(module)
+    found = dict.fromkeys(_parents(module))
+    with suppress(SyntaxError, ValueError):  # of a compiled module
+        for node in ast.walk(ast.parse(_source(module))):
+            for name in _names(node, "" if spec is None else spec.parent or ""):
+                found |= dict.fromkeys([*_parents(name), name])
+    return tuple(name for name in found if _is_foreign(name) and _spec(name) is not None)
 
-    def sources(self) -> dict[str, bytes]:
-        """Return the files of these modules."""
-        files = {name: getattr(module, "__file__", None) for name, module in self.modules.items()}
-        files.setdefault(self._module, sys.modules[self._module].__file__)
-        return {name: SourceFileLoader(name, file).get_data(file) for name, file in files.items() if file}
+
+def _parents(module: str) -> list[str]:
+    parts = module.split(".")
+    return [".".join(parts[:count]) for count in range(1, len(parts))]
+
+
+def _names(node: ast.AST, package: str) -> Iterator[str]:
+    """Yield the modules that a statement may import: a name that is imported from a package may be one."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        base = "." * node.level + (node.module or "")
+        with suppress(ImportError):  # above its top
+            base = resolve_name(base, package or None)
+        if base and not base.startswith("."):
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names if alias.name != "*")
+
+
+def _belongs(other: str, module: str) -> bool:
+    """Whether a module is of the same package as another, or lies in the same folder outside of the libraries."""
+    here, there = _folder(_top(module)), _folder(_top(other))
+    return _top(other) == _top(module) or (bool(here) and here == there and not in_library(f"{here}/"))
+
+
+@cache
+def _folder(top: str) -> str:
+    """Return the folder of a module or package; empty where it is unknown."""
+    spec = _spec(top)
+    if spec is None:
+        return ""
+    places = [*(spec.submodule_search_locations or ())]
+    place = places[0] if places else (spec.origin or "") if spec.has_location else ""
+    return place.rpartition("/")[0]

@@ -117,10 +117,10 @@ def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
 
 def _registering(kind: type[Any], type_name: str, name: str, settings: type[Any], **about: Any) -> Decorator:
     def register(made: Made) -> Made:
-        if "slots" in about and type_name != "model":
-            what = "its slots are declared in its class, as offset = slot(3), not by slots="
+        declared = _declared(made, about)
+        if what := _misplaced(kind, about, declared):
             raise Refused(f"{word_of(type_name)} {name} of {made.__module__}: {what}")
-        its = about | _declared(made, about)
+        its = about | declared
         found = _described(kind, {"type_name": type_name, "name": name, "factory": made, "settings": settings, **its})
         check_component_type(found)
         key = type_name, name
@@ -144,6 +144,19 @@ def _declared(made: Any, about: Mapping[str, Any]) -> dict[str, Any]:
     if needs := tuple(one.name for one in declared if one.size is None):
         found["needs"] = (*needs, *about.get("needs", ()))
     return found
+
+
+def _misplaced(kind: type[Any], about: Mapping[str, Any], declared: Mapping[str, Any]) -> str:
+    """Return what is wrong with the place of declared slots and needs; empty if nothing is."""
+    if kind is Model:
+        return "the slots of a model are slots= of its registration, not slot() or need()" if declared else ""
+    if "slots" in about:
+        return "its slots are declared in its class, as offset = slot(3), not by slots="
+    if "shared" in declared and kind is not EntityRule:
+        return "slot(shared=True) is valid in rules of entities only"
+    if "needs" in declared and kind is WorldRule:
+        return "need() is valid in components of entities only; a rule of the world reads all entities"
+    return ""
 
 
 def _described(kind: type[Any], about: dict[str, Any]) -> Any:

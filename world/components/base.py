@@ -41,7 +41,8 @@ def slot(size: Size = 1, *, shared: bool = False) -> Slot:
     """Declare a slot at the class of a component: with `target = slot(3)`, `self.target` is the slot `target`.
 
     The name of the slot is that of the attribute, without `_` before it. `ENTITY` in place of a size is a reference to
-    an entity. A rule of an entity writes the model's field of that name instead where there is one, if it is `shared`.
+    an entity. The size may be a function of (settings, carrier), except in rules. If it is `shared`, a rule of an
+    entity writes the model's field of that name instead, where there is one.
     """
     return cast("Slot", Declared(size, is_shared=shared))
 
@@ -60,8 +61,8 @@ class Component:
     """The slots and needs of the class, by attribute."""
 
     def __init_subclass__(cls) -> None:
-        of_classes = [one for kind in reversed(cls.__mro__) for one in vars(kind).items()]
-        cls.declared = {attribute: one for attribute, one in of_classes if isinstance(one, Declared)}
+        attributes = {attribute: one for kind in reversed(cls.__mro__) for attribute, one in vars(kind).items()}
+        cls.declared = {attribute: one for attribute, one in attributes.items() if isinstance(one, Declared)}
 
     def __new__(cls, settings: Any, at: Any, *more: Any) -> Self:
         made = super().__new__(cls)
