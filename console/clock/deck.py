@@ -112,12 +112,12 @@ class Deck(Clock):
 
     def tick(self) -> int:
         """Return the tick that was reached; at its end a recording begins again or pauses."""
-        return int(self._advance())
+        return int(self._advance(self.clock_ns()))
 
-    def _advance(self) -> Fraction:
+    def _advance(self, now_ns: int) -> Fraction:
+        """Return the position at a wall time."""
         if self.paused:
             return self._at
-        now_ns = self.clock_ns()
         at = self._at + max(0, now_ns - self._anchor_ns) * self.pace.factor / self.tick_ns
         if at < self.last:
             return at
@@ -128,15 +128,16 @@ class Deck(Clock):
         self._at, self._anchor_ns = self.first + (at - self.last) % (self.last - self.first), now_ns
         return self._at
 
-    def _anchor(self, at: Fraction | int) -> None:
-        self._at, self._anchor_ns = Fraction(at), self.clock_ns()
+    def _anchor(self, at: Fraction | int, now_ns: int) -> None:
+        self._at, self._anchor_ns = Fraction(at), now_ns
 
     def grow(self, first: int, last: int) -> None:
         """Take other ends: a recording that is still being written has grown, or let its oldest files go."""
-        at = self._advance()
+        now_ns = self.clock_ns()
+        at = self._advance(now_ns)
         self.first, self.last = first, last
         self.jumps += at < first
-        self._anchor(min(max(at, Fraction(first)), Fraction(last)))
+        self._anchor(min(max(at, Fraction(first)), Fraction(last)), now_ns)
         self.changed()
 
     # --- requests ----------------------------------------------------------------------------------------------------
@@ -144,70 +145,72 @@ class Deck(Clock):
     def request(
         self, verb: str, arguments: Mapping[str, Any], neighbour: Callable[[int, bool], int | None]
     ) -> Answered:
-        """Execute a request. `neighbour` gives the next recorded tick, later or earlier.
+        """Execute a request at one wall time. `neighbour` gives the next recorded tick, later or earlier.
 
         Raises InvalidRequest for an unknown verb, BadValue for wrong arguments.
         """
         checked(verb, arguments)
+        now_ns = self.clock_ns()
         if verb in ("play", "resume"):
-            self._play()
+            self._play(now_ns)
         elif verb == "pause":
-            self._pause()
+            self._pause(now_ns)
         elif verb == "step":
-            self._step(arguments.get("count", 1), arguments.get("unit", "ticks"), neighbour)
+            self._step(arguments.get("count", 1), arguments.get("unit", "ticks"), neighbour, now_ns)
         elif verb == "seek":
-            self._seek(needed(verb, arguments, "tick"))
+            self._seek(needed(verb, arguments, "tick"), now_ns)
         elif verb == "rate":
-            self._set_rate(needed(verb, arguments, "pace"))
+            self._set_rate(needed(verb, arguments, "pace"), now_ns)
         else:
             self.loops = needed(verb, arguments, "on")
         self.changed()
-        return Answered(self._text(verb), self.tick())
+        tick = int(self._advance(now_ns))
+        return Answered(self._text(verb, tick), tick)
 
-    def _play(self) -> None:
+    def _play(self, now_ns: int) -> None:
         """Play; at the end, from the beginning."""
         if self.paused:
             if self._at >= self.last:
-                self._seek(self.first)
+                self._seek(self.first, now_ns)
             self.paused = False
-            self._anchor(self._at)
+            self._anchor(self._at, now_ns)
 
-    def _pause(self) -> None:
+    def _pause(self, now_ns: int) -> None:
         """Pause, at a whole tick."""
-        self._at, self.paused = Fraction(self.tick()), True
+        self._at, self.paused = Fraction(int(self._advance(now_ns))), True
 
-    def _seek(self, tick: int) -> None:
+    def _seek(self, tick: int, now_ns: int) -> None:
         if not self.first <= tick <= self.last:
             raise BadValue(f"seek: not a tick of the recording, which has {self.first} to {self.last}", tick)
         self.jumps += 1
-        self._anchor(tick)
+        self._anchor(tick, now_ns)
 
-    def _step(self, count: int, unit: str, neighbour: Callable[[int, bool], int | None]) -> None:
+    def _step(self, count: int, unit: str, neighbour: Callable[[int, bool], int | None], now_ns: int) -> None:
         """Go some ticks or recorded moments forward, or back where negative, as far as there are any; pause there."""
         if unit not in UNITS:
             raise BadValue(f"step: a unit is {' or '.join(UNITS)}", unit, nearest_name(unit, UNITS))
         if unit == "frames":
-            here = self.tick()
+            here = int(self._advance(now_ns))
             there = neighbour(here, count > 0)
             count = (there - here) if there is not None else 0
             if not count:
                 raise BadValue(f"step: nothing is recorded {'after' if there is None else 'at'} tick {here}")
         if not count or abs(count) > STEP_MAX:
             raise BadValue(f"step: a count out of range 1 to {STEP_MAX}, or negative to go back", count)
-        self._pause()
+        self._pause(now_ns)
         self.jumps += count < 0
         self._at = Fraction(min(max(int(self._at) + count, self.first), self.last))
 
-    def _set_rate(self, text: str) -> None:
+    def _set_rate(self, text: str, now_ns: int) -> None:
         """Continue at another rate. Raises BadValue: a page has no `fast`."""
         pace = parse_pace(text)
         if pace.kind == "fast":
             raise BadValue("rate: a recording is shown at realtime or a factor such as 8x", text)
-        self._anchor(self._advance())
+        self._anchor(self._advance(now_ns), now_ns)
         self.pace = pace
 
-    def _text(self, verb: str) -> str:
-        where = f"tick {self.tick()}, {self.time_ns() / 1e9:g} s"
+    def _text(self, verb: str, tick: int) -> str:
+        where = f"tick {tick}, {tick * self.tick_ns / 1e9:g} s"
         if verb == "rate":
             return f"at {self.pace} from {where} on"
         if verb == "loop":

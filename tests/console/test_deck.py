@@ -18,7 +18,13 @@ class Stage(Deck):
 
     def __init__(self) -> None:
         self.now_ns = 0
-        super().__init__(500, 1500, TICK_NS, lambda: self.now_ns)
+        self.reading_ns = 0
+        """Wall time that passes with each reading of the clock."""
+        super().__init__(500, 1500, TICK_NS, self._clock)
+
+    def _clock(self) -> int:
+        self.now_ns += self.reading_ns
+        return self.now_ns
 
     def at(self, now_s: float) -> int:
         self.now_ns = round(now_s * SECOND_NS)
@@ -57,6 +63,33 @@ def test_steps_go_as_far_as_there_are_ticks_and_pause() -> None:
     assert deck.ask("step", count=3) == 513 and deck.paused and deck.at(1) == 513
     jumps = deck.jumps
     assert deck.ask("step", count=-20) == 500 and deck.jumps == jumps + 1, "a step back cuts paths"
+
+
+@pytest.mark.parametrize(("count", "there"), [(1, 600), (-1, 510)])
+def test_a_step_to_a_recorded_moment_while_it_plays_ends_there(count: int, there: int) -> None:
+    deck = Stage()
+    deck.ask("play")
+    deck.now_ns, deck.reading_ns = 50 * TICK_NS, TICK_NS
+
+    def neighbour(tick: int, later: bool) -> int:
+        assert (tick, later) == (551, count > 0)
+        deck.now_ns += 5 * TICK_NS
+        return there
+
+    answer = deck.request("step", {"count": count, "unit": "frames"}, neighbour)
+    assert (answer.text, answer.tick) == (f"paused at tick {there}, {there * TICK_NS / SECOND_NS:g} s", there)
+    assert deck.tick() == there
+
+
+def test_a_request_holds_at_one_time_and_none_is_lost() -> None:
+    deck = Stage()
+    deck.reading_ns = TICK_NS
+    assert deck.ask("play") == 500
+    answer = deck.request("rate", {"pace": "2x"}, lambda tick, later: None)
+    assert (answer.text, answer.tick) == ("at 2x from tick 501, 1.002 s on", 501)
+    deck.grow(500, 2000)
+    deck.ask("rate", pace="realtime")
+    assert deck.tick() == 506, "two ticks until the growth, two until the rate, one since"
 
 
 @pytest.mark.parametrize(
