@@ -86,12 +86,16 @@ class RunFolder:
         """Return the log file of one process."""
         return self.logs / f"{process}.log"
 
-    def hold(self) -> None:
-        """Lock the folder as its live supervisor, until this process ends. Raises NoRun when another one does."""
+    def hold(self, *, has_spare: bool = True) -> None:
+        """Lock the folder as its live supervisor, until this process ends. Raises NoRun when another one does.
+
+        `has_spare`: keep space for the result on the disk.
+        """
         self._lock = self._take(LOCK_FILE)
         if self._lock is None:
             raise NoRun(f"run {self.name} has a supervisor already")
-        (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
+        if has_spare:
+            (self.path / SPARE_FILE).write_bytes(bytes(SPARE_BYTES))
 
     def hold_launcher(self) -> None:
         """Lock the folder as its run's launcher, until this process ends. Raises Refused when it has another one."""

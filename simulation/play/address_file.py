@@ -33,7 +33,7 @@ def noted(address: str, capture: Path, pki: Path | None) -> Iterator[None]:
     with suppress(OSError):
         forget_old(replays_folder())
         folder.path.mkdir(parents=True)
-        folder.hold()
+        folder.hold(has_spare=False)
         now = wall_clock.now_text()
         folder.write_info(RunInfo(folder.name, "", str(capture.absolute()), os.getpid(), now, address, pki=at))
     try:

@@ -40,6 +40,7 @@ from foosim.protocol.replay_messages import (
 )
 from foosim.runtime.transport.certificate_folder import CertificateError
 from foosim.runtime.transport.certificates import load_credentials
+from foosim.simulation.play.address_file import replays_folder
 from foosim.simulation.play.main import PlayOptions, PlayResult, Stopper, play_capture
 from foosim.simulation.play.terminal import Lines
 from foosim.simulation.run import rehearse
@@ -206,9 +207,11 @@ def test_the_command_controls_the_newest_replay(run: Path) -> None:
         assert replay("control", "rate", "4x", "--address", play.address).out == "run.mcap: 0.250 s, paused 4x\n"
         status = msgspec.json.decode(replay("control", "status", "--json").out)
         assert status["published"] > 0 and status["until_ns"] == TICKS * TICK_NS
+        (folder,) = replays_folder().iterdir()
+        assert sum(file.stat().st_size for file in folder.iterdir()) < 1000, "its address, no space for a result"
         assert replay("control", "stop").code == 0
         assert play.result().reason == "stopped"
-    assert replay("control", "status").code == 1
+    assert replay("control", "status").code == 1 and not [*replays_folder().iterdir()]
 
 
 @pytest.mark.parametrize(
