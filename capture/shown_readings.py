@@ -1,5 +1,5 @@
-"""The readings of sensors for viewers: as the Foxglove message that a sensor names (`shown`), of any other
-sensor from a plug-in as JSON.
+"""The readings of sensors for viewers: as the Foxglove message that a sensor names
+(`world/component_types/shown.py`), of any other sensor from a plug-in as JSON.
 
 Each of them has a topic, `/readings/ROBOT/CHANNEL`. A message is the reading as the robot sent it: after modifiers,
 before the network.

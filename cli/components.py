@@ -167,7 +167,7 @@ def _paired(kinds: Mapping[str, str]) -> str:
 
 
 def _counted(slots: Mapping[str, int | None]) -> str:
-    sizes = {field: "by its settings" if size is None else size for field, size in slots.items()}
+    sizes = {field: "n by settings" if size is None else size for field, size in slots.items()}
     return ", ".join(field if size == 1 else f"{field}[{size}]" for field, size in sizes.items())
 
 

@@ -96,7 +96,7 @@ def _bounds_of_messages_are_read() -> None:
 
 
 @pytest.fixture(autouse=True)
-def _own_forms_are_forgotten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _own_components_are_forgotten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What a test registers, imports from its folder and installs there is unknown to the others."""
     modules, known, loaded = set(sys.modules), set(registry._known), dict(registry._loaded)
     yield

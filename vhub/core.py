@@ -199,7 +199,10 @@ class HubCore:
     # --- what the shell calls --------------------------------------------------------------------------------------
 
     def receive(self, channel: Channel, name: str, payload: bytes, now_ns: int) -> None:
-        """Take one message; a malformed or misplaced one is counted and dropped, and any once the capture is closed."""
+        """Take one message; a malformed or misplaced one is counted and dropped.
+
+        Any one is dropped once the capture is being closed.
+        """
         if self.is_closing:
             return
         try:

@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 from pydantic import Field
 
 from foosim.common.spec_base import default
-from foosim.library.rigid.joints import JointActuator, JointLoopSettings, Positions, joint_count
+from foosim.library.rigid.joints import JointActuator, JointLoopSettings, Positions, checked_joint_count
 from foosim.library.rigid.spline import fastest, position_at
 from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.quantities import JobNumber
@@ -69,7 +69,7 @@ class JointTrajectory(JointActuator):
 
     start_tick, count, failure = slot(), slot(), slot()
     times = slot(lambda settings, carrier: settings.points)
-    positions = slot(lambda settings, carrier: settings.points * joint_count(settings, carrier))
+    positions = slot(lambda settings, carrier: settings.points * checked_joint_count(settings, carrier))
     FAILURES: ClassVar = {
         TrajectoryFailure.POINTS: "it has no points, more than the actuator takes, or not as many positions as times",
         TrajectoryFailure.TIMES: "its times do not rise",

@@ -49,7 +49,7 @@ class JointLoopSettings(JointSettings):
     gain: Gain = default("20 Hz")
 
 
-def joint_count(settings: JointSettings, carrier: Carrier) -> int:
+def checked_joint_count(settings: JointSettings, carrier: Carrier) -> int:
     """Return the count of joints that an actuator drives.
 
     Raises BadValue for a robot without joints, and for the gain of a loop that overshoots.
@@ -98,7 +98,7 @@ class JointGroup:
 class JointActuator(Actuator):
     """An actuator that keeps a set-point for each joint."""
 
-    set_point = slot(joint_count)
+    set_point = slot(checked_joint_count)
     joint_positions = need()
 
     def __init__(self, settings: JointSettings, at: Mounting) -> None:

@@ -4,9 +4,9 @@ Receiving threads only offer messages. The loop takes all of them, decides, and 
 A receiving thread does nothing else, because other messages wait for it.
 
 A waiting reader costs a wake-up for each message, and a receiving thread between network and reader a second one: a
-quarter of the cost of a tick's messages (`bench/barrier.py`). So an inbox can have `Source`s, in one of whose queues
-the reader itself waits: that of the channel that it lacks, so that no other message wakes it. It empties the others
-whenever it is awake; an offer of a thread rings the bell of the queue in which it waits.
+quarter of the cost of a tick's messages. So an inbox can have `Source`s, in one of whose queues the reader itself
+waits: that of the channel that it lacks, so that no other message wakes it. It empties the others whenever it is awake;
+an offer of a thread rings the bell of the queue in which it waits.
 """
 
 from __future__ import annotations

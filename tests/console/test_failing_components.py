@@ -1,4 +1,4 @@
-"""Forms that raise in what is only shown: they are named, with their place, and all else is drawn."""
+"""Components that raise in what is only shown: they are named, with their place, and all else is drawn."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from foosim.world.frame import Frame
 from tests.console.memory import TABLE
 from tests.own_components import folder_on_path
 
-FORMS: Final = """
+PARTS: Final = """
 import sys
 import numpy as np
 from msgspec import Struct
@@ -81,26 +81,26 @@ class Wears(EntityRule):
 SETS: Final = (
     "engine=pure",
     "players={}",
-    *(f"robots.{robot}.sensors.beam={{kind: 'shown_forms:Beam', rate: 50 Hz}}" for robot in ("red.goal", "blue.goal")),
-    *(f"robots.{robot}.rules={{wears: {{kind: 'shown_forms:Wears'}}}}" for robot in ("red.goal", "blue.goal")),
-    "rules={told: {kind: 'shown_forms:Marks'}}",
+    *(f"robots.{robot}.sensors.beam={{kind: 'shown_parts:Beam', rate: 50 Hz}}" for robot in ("red.goal", "blue.goal")),
+    *(f"robots.{robot}.rules={{wears: {{kind: 'shown_parts:Wears'}}}}" for robot in ("red.goal", "blue.goal")),
+    "rules={told: {kind: 'shown_parts:Marks'}}",
 )
 RAY: Final = [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
 
 
 @pytest.fixture
 def components(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    (tmp_path / "shown_forms.py").write_text(FORMS)
+    (tmp_path / "shown_parts.py").write_text(PARTS)
     folder_on_path(tmp_path, monkeypatch)
-    module = import_module("shown_forms")
+    module = import_module("shown_parts")
     yield module
-    sys.modules.pop("shown_forms")
+    sys.modules.pop("shown_parts")
 
 
 def line_of(text: str) -> str:
     """The place of the line of the module that has this text."""
-    number = next(n for n, line in enumerate(FORMS.splitlines(), 1) if text in line)
-    return f"(shown_forms.py:{number})"
+    number = next(n for n, line in enumerate(PARTS.splitlines(), 1) if text in line)
+    return f"(shown_parts.py:{number})"
 
 
 def deployment() -> Any:
@@ -167,8 +167,8 @@ def test_marks_that_fail_are_a_mark_and_the_others_told(components: Any, name: s
     (failed,) = [mark for mark in told if mark.kind == FAILED]
     place = line_of("def marks(" if name == "rule" else "def __init__(self, settings, at):")
     if name != "rule":
-        lines = [n for n, line in enumerate(FORMS.splitlines(), 1) if "def marks(" in line]
-        place = f"(shown_forms.py:{lines[1]})"
+        lines = [n for n, line in enumerate(PARTS.splitlines(), 1) if "def marks(" in line]
+        place = f"(shown_parts.py:{lines[1]})"
     called = "rule told of the world" if name == "rule" else "rule wears of red.goal"
     assert failed == Mark(3, FAILED, f"marks of {called} failed at tick 3: {said.format(place)}")
     assert len(told) == 3 and FAILED in mark_kinds(found)

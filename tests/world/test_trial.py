@@ -54,7 +54,7 @@ class Slides(Motion):
             view.write(velocity, speed, 0.0, 0.0)
 
 
-@model("slider", Mover, motion=Slides, actuators={"speed": {"kind": "own_forms:Speed"}}, slots={
+@model("slider", Mover, motion=Slides, actuators={"speed": {"kind": "own_parts:Speed"}}, slots={
     "position": 3, "orientation": 4, "velocity": 3, "quarantined": 1, "down": 1, "refused": 1})
 class Moves(Model):
     def __init__(self, settings, at):
@@ -158,25 +158,25 @@ class Drives(Player):
 def pillar(settings):
     return (Shape(Box((0.1, 0.1, 1.0)), "", GREY, (3.0, -2.0, 1.0), name="pillar"),)
 """
-SENSOR: Final = {"kind": "own_forms:Places", "rate": "50 Hz", "modifiers": [{"kind": "own_forms:Halves"}]}
+SENSOR: Final = {"kind": "own_parts:Places", "rate": "50 Hz", "modifiers": [{"kind": "own_parts:Halves"}]}
 
 
 def own_world() -> World:
     """A hall with rovers, and all of own components."""
-    world = HALL.with_(("robots", "mover"), {"model": "own_forms:Moves"}, ())
+    world = HALL.with_(("robots", "mover"), {"model": "own_parts:Moves"}, ())
     world = world.with_(("robots", "mover", "sensors"), {"places": SENSOR}, ())
-    world = world.with_(("robots", "mover", "rules"), {"wears": {"kind": "own_forms:Wears"}}, ())
+    world = world.with_(("robots", "mover", "rules"), {"wears": {"kind": "own_parts:Wears"}}, ())
     world = world.with_(("robots", ROVERS[0], "sensors", "places"), SENSOR, ())
-    world = world.with_(("scene",), {"kind": "own_forms:pillar"}, ())
-    own = {"class": "own_forms:Drives", "rate": "50 Hz", "lockstep": True, "robots": {"mover": []}}
+    world = world.with_(("scene",), {"kind": "own_parts:pillar"}, ())
+    own = {"class": "own_parts:Drives", "rate": "50 Hz", "lockstep": True, "robots": {"mover": []}}
     world = world.with_(("players", "own"), own, ())
-    return world.with_(("rules",), {"counts": {"kind": "own_forms:Counts"}}, ())
+    return world.with_(("rules",), {"counts": {"kind": "own_parts:Counts"}}, ())
 
 
 def planted(folder: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> None:
-    (folder / "own_forms.py").write_text(source)
+    (folder / "own_parts.py").write_text(source)
     folder_on_path(folder, monkeypatch)
-    sys.modules.pop("own_forms", None)
+    sys.modules.pop("own_parts", None)
 
 
 def test_what_works_is_valid_and_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,7 +217,7 @@ def test_a_component_that_raises_is_refused_by_name_at_its_place_with_its_line(
     lines = GOOD.splitlines()
     lines[line - 1 : line - 1] = ["        1 / 0" if component != "pillar" else "    1 / 0"]
     (problem,) = refused(tmp_path, monkeypatch, "\n".join(lines))
-    assert "ZeroDivisionError" in problem and f"(own_forms.py:{line})" in problem
+    assert "ZeroDivisionError" in problem and f"(own_parts.py:{line})" in problem
     assert method in ("status", "text") or f": {PLACES[component]}" in problem
 
 
@@ -228,7 +228,7 @@ BROKEN: Final = {
         "return True\n\n\nclass Wanted",
         "pass\n\n\nclass Wanted",
         "robots:",
-        "is_plausible() returned None; expected True or False (own_forms.py:",
+        "is_plausible() returned None; expected True or False (own_parts.py:",
     ),
     "a motion into nowhere": (
         "x + speed * dt",
@@ -240,38 +240,38 @@ BROKEN: Final = {
         "abs(view.read(self.velocity)[0])",
         "float('nan')",
         "robots.mover.rules",
-        "nan for mover wears.way: numbers of a frame are finite (own_forms.py:",
+        "nan for mover wears.way: numbers of a frame are finite (own_parts.py:",
     ),
     "a slot that is none": ('at.slot("quarantined")', 'at.slot("quarantind")', "robots.mover.sensors:", "quarantind"),
     "a reading of another type": (
         "Reading(*view",
         "tuple(view",
         "robots.mover.sensors:",
-        "sample() returned (3.0, 2.0); expected a Reading (own_forms.py:",
+        "sample() returned (3.0, 2.0); expected a Reading (own_parts.py:",
     ),
     "too few numbers": (
         "for value in values]",
         "for value in values[1:]]",
         "robots.mover.sensors:",
-        "; expected a list of 2 numbers, or None (own_forms.py:",
+        "; expected a list of 2 numbers, or None (own_parts.py:",
     ),
     "limits of no field": (
         '{"speed": (',
         '{"sped": (',
         "robots.mover.actuators",
-        "; expected a mapping of fields (speed) to least and greatest value (own_forms.py:",
+        "; expected a mapping of fields (speed) to least and greatest value (own_parts.py:",
     ),
     "one motor, flat": (
         "[0], 1.0),)",
         "[0], 1.0))",
         "robots.mover.actuators",
-        "; expected a tuple of (target, greatest force) (own_forms.py:",
+        "; expected a tuple of (target, greatest force) (own_parts.py:",
     ),
     "a rule's place that writes by hand": (
         "        view.write(self.ticks, 5.0)",
         "        view.write(self.ticks, 5.0)\n        view.numbers[0] = 0.125",
         "rule counts of the world failed",
-        "TypeError: numbers of a frame are written by view.write alone (own_forms.py:",
+        "TypeError: numbers of a frame are written by view.write alone (own_parts.py:",
     ),
     "a status with an object": (
         '{"ticks": view.read(self.ticks)[0]}',
@@ -348,7 +348,7 @@ def test_a_misdeed_at_any_tick_ends_the_run_with_its_name_its_tick_and_its_line(
     assert done["failed"] and found is not None and TICK <= int(found[1]) == failed["tick"] <= TICK + 5, done["reason"]
     assert any(failed["traceback"] in text for text in logged)
     if not line.startswith("return"):
-        assert f"(own_forms.py:{number})" in done["reason"] and failed["traceback"].startswith("Traceback")
+        assert f"(own_parts.py:{number})" in done["reason"] and failed["traceback"].startswith("Traceback")
 
 
 @pytest.mark.parametrize(("component", "method"), [key for key in AT_TICKS if key[0] != "Slides"])
@@ -360,7 +360,7 @@ def test_a_direct_write_to_the_frame_is_found_by_the_check_of_components(
     check = ComponentCheck(own_world().text(), NAME, 20)
     (line,) = check.broken()
     assert check.has_failed and AT_TICKS[component, method] in line
-    assert f"TypeError: numbers of a frame are written by view.write alone (own_forms.py:{number})" in line
+    assert f"TypeError: numbers of a frame are written by view.write alone (own_parts.py:{number})" in line
 
 
 def test_an_interrupt_is_no_misdeed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -401,4 +401,4 @@ def test_no_command_is_done_where_a_component_leaves(
     words = {"check": [], "components check": ["places", "--in"], "rehearse": ["--for", "500ms"]}[command]
     done = typed(*command.split())(*words, str(tmp_path / NAME))
     assert done.code == (1 if tick else 2), done
-    assert f"failed at tick {tick or 1}: SystemExit: 0 (own_forms.py:{number})" in done.out + done.err
+    assert f"failed at tick {tick or 1}: SystemExit: 0 (own_parts.py:{number})" in done.out + done.err

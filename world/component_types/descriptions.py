@@ -210,12 +210,13 @@ class Component(ComponentType):
     or a function that returns it.
     `moves`: an actuator commands the motors of its robot. `joints` is the setting that names their joints, in the order
     of the actuator's set-points; without such a setting, or with None, it commands all. No motor is commanded by two
-    actuators. `jobs`: its commands may be jobs (`jobs`).
+    actuators. `jobs`: its commands may be jobs (`component_types/jobs.py`).
     `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0; or a function that returns it, maybe a slot of an actuator.
-    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `shown`; empty for none.
-    `per_field` are the settings with a number for each field (`per_field`), and the least that is valid of each;
-    None without a least one.
+    `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `component_types/shown.py`; empty
+    for none.
+    `per_field` are the settings with a number for each field (`component_types/per_field.py`), and the least that is
+    valid of each; None without a least one.
     """
 
     value: type[Struct] | None = None
@@ -336,9 +337,9 @@ class WorldRule(ComponentType):
     """A change of the world by itself, before a tick is solved.
 
     `slots` are its state, as its class declares it, as `NAME.FIELD` of the entity `world`, NAME being that of the rule
-    in its world; `each` are
-    its state of the entities of a model (`ROBOTS`: of all robots), as `NAME.FIELD`. `writes` are the models whose state
-    it may change. `settable` are its fields that can be set, as of a rule of entities (`EntityRule`).
+    in its world; `each` are its state of the entities of a model (`ROBOTS`: of all robots), as `NAME.FIELD`. `writes`
+    are the models whose state it may change. `settable` are its fields that can be set, as of a rule of entities
+    (`EntityRule`).
     """
 
     slots: Mapping[str, int] = field(default_factory=dict)

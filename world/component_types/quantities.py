@@ -22,5 +22,5 @@ Share: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 Count: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
 Kilograms: TypeAlias = Annotated[float, Meta(extra={"unit": "kg"})]
 JobNumber: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]
-"""The last field of a command that may be a job (`jobs`)."""
+"""The last field of a command that may be a job (`component_types/jobs.py`)."""
 QuaternionPart: TypeAlias = Annotated[float, Meta(extra={"unit": ""})]

@@ -1,4 +1,4 @@
-"""The state of an actuator's jobs, and the effect of each command on it: see `jobs`."""
+"""The state of an actuator's jobs, and the effect of each command on it: see `component_types/jobs.py`."""
 
 from __future__ import annotations
 

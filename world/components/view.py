@@ -1,7 +1,8 @@
 """Common parts of sensors and actuators: their view of the world, and their mounting.
 
 A component is a pure function of the frame, its settings and keyed draws. All its state is numbers of the frame, which
-it declares when it registers itself (`registry`); an object keeps only data of deployment and layout.
+it declares when it registers itself (`component_types/registry.py`); an object keeps only data of deployment
+and layout.
 """
 
 from __future__ import annotations
