@@ -30,8 +30,8 @@ def check(
 ) -> None:
     """Check a deployment file, with settings if there are any.
 
-    Prints all problems, one a line: file:line:column: problem, value, nearest valid name. Errors between fields
-    is found when each field is right by itself. When there are no problems, the classes of the players on this machine
+    Prints all problems, one a line: file:line:column: problem, value, nearest valid name. Problems between
+    fields are reported once each field is valid by itself. Without problems, the classes of the players on this machine
     are imported.
     """
     from foosim.deployment.loader import expanded_text

@@ -125,7 +125,8 @@ def foosim(version: VersionOption = False) -> None:
     `up` starts all processes that a deployment file declares, and shows the run. The other commands of a run control it
     from another terminal; each answer has the tick at which it takes effect.
 
-    Exit codes: 0 done, 1 failed or differs, 2 bad input, 3 refused, 130 second Ctrl-C.
+    Exit codes: 0 done, 1 failed or differs, 2 bad input, 3 refused, 4 equal up to the end of an incomplete capture, 130
+    second Ctrl-C.
     """
 
 

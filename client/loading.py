@@ -48,7 +48,7 @@ def look_in(folder: str) -> None:
 def load_player(path: str) -> Callable[..., Any]:
     """Import the class that `module:Class` names and return it. Raises ClassPathError."""
     try:
-        made: Callable[..., Any] = class_at(path)
+        made: Callable[..., Any] = class_at(path, "beside the deployment or on PYTHONPATH")
     except BadValue as error:
         raise ClassPathError(path, error.problem, error.nearest) from error.__cause__
     problem = _unfit(made, path.partition(":")[2])

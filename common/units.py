@@ -136,10 +136,10 @@ def _other_dimension(unit: str, dimension: Dimension) -> Dimension | None:
 
 
 def _nearest_unit(unit: str, dimension: Dimension) -> str | None:
-    """The unit that was probably meant: one of equal length first, so that `MM` for a length suggests `mm`."""
+    """The unit that was probably meant: first one that differs in case alone, so that `MM` suggests `mm`."""
     plain = unit[:32].translate(_SIGNS)
-    equal = [candidate for candidate in dimension.units if len(candidate) == len(plain)]
-    return nearest_name(plain, equal, 0.5) or nearest_name(plain, dimension.units, 0.5)
+    equal = [candidate for candidate in dimension.units if candidate.lower() == plain.lower()]
+    return equal[0] if equal else nearest_name(plain, dimension.units, 0.5)
 
 
 def parse_ns(text: object) -> int:
@@ -235,6 +235,10 @@ class Quantity:
     dimension: Dimension
     low: str
     high: str
+
+    def __post_init__(self) -> None:
+        if parse(self.low, self.dimension) > parse(self.high, self.dimension):
+            raise BadValue(f"a range with a lower bound above the upper bound {self.high}", self.low)
 
     def read(self, value: object) -> float | int | Fraction:
         """Return the number; raises pydantic's error for another quantity and for a value out of bounds."""

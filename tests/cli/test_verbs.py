@@ -138,7 +138,7 @@ def test_a_valid_file_whose_players_cannot_be_found_is_refused_but_for_those_on_
     lines = text.splitlines()
     number = next(at for at, line in enumerate(lines, 1) if "foosim.library.table.players.football:Team" in line)
     place = f"{path}:{number}:{lines[number - 1].index('foosim.') + 1}: "
-    missing = "there is no module own_team (it is neither beside the deployment nor on PYTHONPATH), 'own_team:Team'"
+    missing = "there is no module own_team (it is not beside the deployment or on PYTHONPATH), 'own_team:Team'"
     assert done.err.splitlines()[0] == f"{place}players.player-red.class: {missing}"
     away = path.read_text().replace("class: own_team:Team", "class: own_team:Team\n    host: arm")
     path.write_text(f"{away}\nhosts:\n  arm:\n    address: 192.0.2.7\n")
@@ -169,7 +169,7 @@ def test_a_file_that_is_not_there_is_bad_input(command: Command) -> None:
         (
             ("--set", "players.player-red.class=own:Acts"),
             2,
-            "there is no module own (it is neither beside the deployment nor on PYTHONPATH), 'own:Acts'",
+            "there is no module own (it is not beside the deployment or on PYTHONPATH), 'own:Acts'",
         ),
         (("--pace", "quick"), 2, "--pace: not a pace (realtime, fast or a factor such as 2x), 'quick'"),
         (("--for", "20"), 2, "--for: not a time (a number and one of ns, us, ms, s, min, h), '20', nearest is '20 s'"),

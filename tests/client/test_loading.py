@@ -69,7 +69,7 @@ CASES = [
     ("own_player", "not of the form module:Class"),
     ("own_player.Acts", "not of the form module:Class, nearest is 'own_player:Acts'"),
     (":Acts", "not of the form module:Class"),
-    ("own_playr:Acts", "there is no module own_playr (it is neither beside the deployment nor on PYTHONPATH),"
+    ("own_playr:Acts", "there is no module own_playr (it is not beside the deployment or on PYTHONPATH),"
      " nearest is 'own_player:Acts'"),
     ("own_player.acts:Acts", "there is no module own_player.acts (own_player is a module, not a package)"),
     ("foosim.library.table.players.footbal:Team",

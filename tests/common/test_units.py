@@ -56,6 +56,13 @@ def test_a_time_is_a_whole_number_of_nanoseconds(text: str, time_ns: int) -> Non
     assert parse_ns(text) == time_ns
 
 
+def test_the_bounds_of_a_quantity_are_of_its_dimension_and_in_order() -> None:
+    with pytest.raises(BadValue, match="V measures a voltage"):
+        units.Quantity(units.PROBABILITY, "1 V", "100 %")
+    with pytest.raises(BadValue, match="a lower bound above the upper bound 1 %, '100 %'"):
+        units.Quantity(units.PROBABILITY, "100 %", "1 %")
+
+
 @pytest.mark.parametrize(
     ("text", "dimension", "message"),
     [
@@ -73,6 +80,7 @@ def test_a_time_is_a_whole_number_of_nanoseconds(text: str, time_ns: int) -> Non
         ("1 MHz", units.RATE, "not a rate (a number and one of Hz, kHz, mHz), '1 MHz', nearest is '1 mHz'"),
         ("1 grün", units.MASS, "not a mass (a number and one of kg, g, mg), '1 grün'"),
         ("1 \x1bm\u202e", units.MASS, "not a mass (a number and one of kg, g, mg), '1 \\x1bm\\u202e'"),
+        ("21 gr", units.MASS, "not a mass (a number and one of kg, g, mg), '21 gr', nearest is '21 g'"),
         ("1 hz", units.RATE, "not a rate (a number and one of Hz, kHz, mHz), '1 hz', nearest is '1 Hz'"),
         ("2 m/s^2", units.ACCELERATION,
          "not an acceleration (a number and one of m/s2, mm/s2), '2 m/s^2', nearest is '2 m/s2'"),

@@ -235,7 +235,7 @@ WRONG: Final = {
     "sensor encodr": "'sensor encodr', nearest is 'sensor encoder'",
     "rule encoder": "'rule encoder', nearest is 'sensor encoder'",
     "foosim.library.table.rod:Rot": "nearest is 'foosim.library.table.rod:Rod'",
-    "own_gone:Own": "no module own_gone (it is neither beside the deployment nor on PYTHONPATH), 'own_gone:Own'",
+    "own_gone:Own": "no module own_gone (it is not on PYTHONPATH), 'own_gone:Own'",
 }
 
 

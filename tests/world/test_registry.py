@@ -246,7 +246,7 @@ REFUSED: Final = {
     "own_gauges:ReachSettings": "not registered as a sensor; own_gauges registers ReachGauge",
     "own_winch:Winch": "not registered as a sensor",
     "json:dumps": "not registered as a sensor",
-    "own_gone:Gauge": "there is no module own_gone (it is neither beside the deployment nor on PYTHONPATH)",
+    "own_gone:Gauge": "there is no module own_gone (it is not on PYTHONPATH)",
     "own_gauges.more:Gauge": "there is no module own_gauges.more (own_gauges is a module, not a package)",
     "own_importer:Gauge": "cannot be imported: ModuleNotFoundError: No module named 'own_missing' (own_importer.py:1)",
     "own_broken:Gauge": "cannot be imported: ZeroDivisionError: division by zero (own_broken.py:2)",

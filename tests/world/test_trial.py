@@ -273,6 +273,12 @@ BROKEN: Final = {
         "rule counts of the world failed",
         "TypeError: numbers of a frame are written by view.write alone (own_parts.py:",
     ),
+    "a status that is none": (
+        'return {"ticks": view.read(self.ticks)[0]}',
+        "return None",
+        "rules.counts",
+        "status() returned None; expected a mapping of names to JSON values (own_parts.py:",
+    ),
     "a status with an object": (
         '{"ticks": view.read(self.ticks)[0]}',
         '{"ticks": 5, "self": self}',

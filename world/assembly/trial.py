@@ -15,11 +15,12 @@ from foosim.common.errors import ABSENT
 from foosim.common.finding import Finding, Location
 from foosim.common.json_text import encode_json
 from foosim.world.assembly.world import (
-    NO_STATUS,
     NO_TEXT,
     World,
     build_scene,
     initial_numbers,
+    status_of,
+    with_status,
     world_status,
     world_texts,
 )
@@ -95,10 +96,13 @@ def _try_tick(spec: WorldSpec, layout: Layout) -> None:
     world.apply_entity_rules(moved, before, numbers, TICK)
     for entity in moved:
         world.problem(entity, numbers, before, TICK)
-    status = world_status(spec, Frame(TICK, layout, np.array(numbers)))
+    frame = Frame(TICK, layout, np.array(numbers))
+    for what, one, seen in with_status(spec, frame):
+        called(what, WORLD, TICK, status_of, one, seen)
+    status = world_status(spec, frame)
     called("status", "", TICK, encode_json, status)
     for text in world_texts(spec, status):
-        assert not text.startswith((NO_STATUS, NO_TEXT)), text
+        assert not text.startswith(NO_TEXT), text
 
 
 def _try_kit(factory: Any, section: Any, spec: WorldSpec) -> None:

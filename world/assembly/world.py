@@ -129,19 +129,29 @@ def initial_numbers(
 
 def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
     """Return the status of rules and kits in a frame, and its counts of clamped and refused commands, as JSON."""
-    view = View(frame.tick, frame.numbers)
     status: dict[str, Any] = {"commands": count_commands(frame)}
-    shown: list[tuple[str, Any, Any]] = [
-        (f"rule {name}", rule, view) for name, rule in rules_of(spec, frame.layout).items()
-    ]
-    shown += [(f"kit {name}", kit, frame) for name, kit in kits_of(spec)]
-    for what, one, seen in shown:
+    for what, one, seen in with_status(spec, frame):
         try:
-            status |= one.status(seen)
+            status |= status_of(one, seen)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # noqa: BLE001  # a run continues without it
             status |= {"failed": f"{NO_STATUS} {what}: {failure_of(error)}"}
+    return status
+
+
+def with_status(spec: WorldSpec, frame: Frame) -> list[tuple[str, Any, Any]]:
+    """Return the label of each rule of the world and each kit, the object, and what its `status` reads."""
+    view = View(frame.tick, frame.numbers)
+    rules = [(f"rule {name}", rule, view) for name, rule in rules_of(spec, frame.layout).items()]
+    return [*rules, *((f"kit {name}", kit, frame) for name, kit in kits_of(spec))]
+
+
+def status_of(one: Any, seen: Any) -> Mapping[str, Any]:
+    """Return the status of a rule or kit. Raises ContractError for another type."""
+    status = one.status(seen)
+    if not isinstance(status, Mapping):
+        raise ContractError(one.status, "a mapping of names to JSON values", status)
     return status
 
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import msgspec
 
 from foosim.common.errors import BadValue, Refused, show
-from foosim.common.names import NAME_RULE, is_name
+from foosim.common.names import NAME_RULE, is_name, nearest_name
 from foosim.common.spec_base import SpecBase
 from foosim.common.units import Quantity
 from foosim.world.component_types import descriptions
@@ -37,6 +37,14 @@ TYPES: Final[Mapping[str, Any]] = {
     "per_field": dict[str, float | None],
 }
 """The types of a description's fields."""
+REQUIRED: Final = {
+    "sensor": "sample",
+    "actuator": "command",
+    "modifier": "apply",
+    "rule": "apply",
+    "entity_rule": "apply",
+}
+"""The hook without which a component has no effect, by type name."""
 
 
 def check_component_type(found: Any) -> None:
@@ -55,6 +63,12 @@ def _problems(found: Any) -> Iterator[str]:
     if bases and not any(vars(one).get("type_name") == found.type_name for one in bases):
         wanted = found.type_name.title().replace("_", "")
         yield f"the class {found.factory.__name__} is not derived from {wanted} of foosim.components"
+    hook = REQUIRED.get(found.type_name, "")
+    if bases and hook and not overrides(found.factory, hook):
+        nearest = nearest_name(hook, vars(found.factory))
+        yield f"the class {found.factory.__name__} has no method {hook}" + (
+            f", nearest is {nearest}" if nearest else ""
+        )
     if not (isinstance(settings, type) and issubclass(settings, base)):
         yield f"its settings are a class derived from {base.__name__}, not {_shown(settings)}"
     for key, kind in TYPES.items():

@@ -294,8 +294,8 @@ def _own_modules() -> Mapping[str, str]:
     }
 
 
-def class_at(path: str) -> Any:
-    """Return the value of `module:Class`, for a component or a player.
+def class_at(path: str, found_on: str = "on PYTHONPATH") -> Any:
+    """Return the value of `module:Class`, for a component or a player; `found_on` is where its module can be.
 
     Raises BadValue for a module that cannot be imported, or has no such name; its nearest is a path that may be meant.
     """
@@ -311,7 +311,7 @@ def class_at(path: str) -> Any:
         _forget_new(known)
         missing = error.name if isinstance(error, ModuleNotFoundError) else None
         if missing and f"{module_name}.".startswith(f"{missing}."):
-            raise _not_found(path, missing) from error
+            raise _not_found(path, missing, found_on) from error
         raise BadValue(f"cannot be imported: {failure_of(error, module_name)}", path) from error
     if not hasattr(module, class_name):
         own = (one for one, its in vars(module).items() if getattr(its, "__module__", "") == module_name)
@@ -322,7 +322,7 @@ def class_at(path: str) -> Any:
     return getattr(module, class_name)
 
 
-def _not_found(path: str, missing: str) -> BadValue:
+def _not_found(path: str, missing: str, found_on: str) -> BadValue:
     """Return the error for a path whose module, or a package of it, cannot be found."""
     parent, dot, last = missing.rpartition(".")
     if dot:
@@ -330,7 +330,7 @@ def _not_found(path: str, missing: str) -> BadValue:
         hint = "" if folders else f" ({parent} is a module, not a package)"
     else:
         folders = [folder for folder in sys.path if not in_library(f"{folder}/")]
-        hint = " (it is neither beside the deployment nor on PYTHONPATH)"
+        hint = f" (it is not {found_on})"
     nearest = nearest_name(last, [module.name for module in iter_modules(folders)] if folders else ())
     found = None if nearest is None else f"{parent}{dot}{nearest}{path[len(missing) :]}"
     return BadValue(f"there is no module {missing}{hint}", path, quoted(found))
