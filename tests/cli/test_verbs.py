@@ -12,7 +12,7 @@ import typer
 
 from foosim.cli import main
 from foosim.cli.role import RoleVerbs
-from foosim.cli.verbs import Foosim
+from foosim.cli.verbs import Foosim, summary
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.text.files import read_deployment_text
 from foosim.launcher import pki as certificates
@@ -49,7 +49,11 @@ def test_help_shows_each_verb_with_the_whole_first_paragraph_of_its_own_help(
         own = typed(*group, *name.split())("--help")
         assert own.code == 0 and own.out.startswith(f"Usage: foosim {' '.join((*group, name))} ")
         command: Any = typer.main.get_command(import_module(f"foosim.{verb}").app)
-        assert f"{name} {summary_of(getattr(command, 'commands', {}).get(name, command))}" in shown
+        commands = getattr(command, "commands", {})
+        command = commands.get(name, command)
+        assert f"{name} {summary(name, verb)} " in f"{shown} "
+        assert summary(name, verb) == summary_of(command)
+        assert all(map(summary_of, [command, *commands.values()])), f"each command of {verb} has a help text"
 
 
 @pytest.mark.parametrize("name", Foosim.plumbing)

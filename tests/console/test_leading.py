@@ -71,8 +71,8 @@ def test_recordings_follow_a_live_run_and_the_distance_is_told_as_it_goes(run: P
             near, far = theirs.of("compared")[-1], walked.of("compared")[-1]
             assert distances(near) == dict.fromkeys({*both} - {"ball-2"}, 0.0), "the spare ball is not there yet"
             assert (near["at"], near["covers"], near["series"]) == (40, (-10, TICKS - 10), [[40, 0.0]])
-            moved = np.linalg.norm(poses(50)[0, :3] - poses(40)[0, :3])
-            assert distances(far)["ball"] == pytest.approx(moved, abs=1e-5)
+            moved = poses(50)[0, :3] - poses(40)[0, :3]
+            assert distances(far)["ball"] == pytest.approx(np.linalg.norm(moved), abs=1e-5)
 
             leader.want(Wanted())
             show(60, of=50)
@@ -81,17 +81,17 @@ def test_recordings_follow_a_live_run_and_the_distance_is_told_as_it_goes(run: P
 
             show(10, of=20, jump=True, paused=True)
             await theirs.until(lambda: theirs.tick == 20 and theirs.moments[-1].paused)
-            await walked.until(lambda: walked.tick == 10 and walked.moments[-1].paused)
-            assert any(moment.jump for moment in theirs.moments[1:]) and walked.moments[-1].jump
+            await walked.until(lambda: walked.tick == walked.of("compared")[-1]["at"] == 10)
+            assert walked.moments[-1].jump and walked.moments[-1].paused and any(one.jump for one in theirs.moments[1:])
             await theirs.until(lambda: theirs.of("status")[-1]["status"]["state"] == "paused")
-            await walked.until(lambda: walked.of("compared")[-1]["at"] == 10)
             assert [tick for tick, _ in walked.of("compared")[-1]["series"]] == [10], "what was later is forgotten"
 
-            show(TICKS + 40, of=50)
+            show(TICKS + 40, of=50, jump=True)
             await theirs.until(lambda: theirs.tick == TICKS and theirs.of("compared")[-1]["at"] == TICKS + 40)
-            await walked.until(lambda: walked.tick == TICKS + 40)
+            await walked.until(lambda: walked.tick == walked.of("compared")[-1]["at"] == TICKS + 40)
             assert (theirs.of("compared")[-1]["entities"], theirs.of("compared")[-1]["series"][-1][1]) == ([], None)
             assert np.isnan(walked.moments[-1].poses).all() and ours.tick == TICKS + 40
+            assert [at for at, _ in walked.of("compared")[-1]["series"]] == [10, 11, TICKS + 40], "a jump leaves a hole"
 
     asyncio.run(look())
 

@@ -299,10 +299,14 @@ class Spoiling:
 
 
 def test_the_end_of_a_run_says_who_is_out() -> None:
-    """By name, in its last lines and its exit code."""
+    """By name, in its last lines and its exit code; the log has it once, and nothing of the small run of engines."""
     text = yard_text(POST, engine="mujoco", objects={"a": {**BOX, "at": {"z": "2 m"}}})
-    out = rehearse(text, "yard.yaml", 50, 1, settings=Settings(factory=Spoiling)).json  # type: ignore[arg-type]
+    lines: list[str] = []
+    settings = Settings(factory=Spoiling, on_log=lambda *line: lines.append(line[2]))  # type: ignore[arg-type]
+    out = rehearse(text, "yard.yaml", 50, 1, settings=settings).json
     assert out["quarantined"] == ["a"] and out["summary"] == ["in quarantine: a"] and not out["failed"]
     assert Outcome(out, ()).failed
+    (logged,) = [line for line in lines if "is in quarantine" in line]
+    assert logged.startswith("tick 0: a is in quarantine for 1 s, ") and "its new position is nan" in logged
     sound = rehearse(text, "yard.yaml", 50, 1).json
     assert sound["quarantined"] == [] and sound["summary"] == [] and not Outcome(sound, ()).failed

@@ -17,10 +17,12 @@ from foosim.node.tick import Stepper
 from foosim.protocol import channels
 from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import CAPTURE, Request, Want
+from foosim.protocol.messages import CAPTURE, DONE_OF, SAMPLES_OF, Heartbeat, Request, Want
 from foosim.simulation.run import rehearse, with_nodes
 from foosim.simulation.system import IDLE_NS_MAX, OPERATOR, Settings, System
+from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.settings import RunSettings
+from foosim.supervisor.state import RunState
 from foosim.vhub.core import HubCore
 from foosim.vhub.wait_times import WaitTimes
 from foosim.world.frame import Frame
@@ -92,7 +94,6 @@ def test_each_kind_of_process_delayed_is_named_in_the_lag_line(process: str, del
 
 def test_a_run_in_time_names_nobody() -> None:
     seen = Seen().go()
-    seen.system.supervisor.progress.on_heartbeat(replace(seen.system.hub.heartbeat(), waiting_for="commit"))
     assert set(seen.late.values()) == {""} and not [line for line in seen.lines if "lag" in line]
     assert seen.system.supervisor.status(0)["late"] == {"lag_ms": 0.0, "waited_for": "", "tick": -1}
 
@@ -385,6 +386,36 @@ def test_nobody_is_overdue_while_the_run_is_paused() -> None:
     system.run()
     assert system.supervisor.state.frame.tick == TICKS and system.answers["resume"].accepted
     assert lines == [f"run ends at tick {TICKS}: done"]
+
+
+@pytest.mark.parametrize(
+    ("waiting_for", "released", "busy", "delivered", "n1", "n2", "late"),
+    [
+        ("", 20, 0, 30, 31, 31, VHUB),
+        ("commit", 20, 0, 30, 31, 31, VHUB),
+        (DONE_OF + "player-red", 20, 0, 30, 31, 31, "player-red"),
+        (SAMPLES_OF + "n2", 20, 0, 30, 31, 31, "n2"),
+        ("", 20, 0, 24, 25, 30, "n2"),  # 6 ms from its inputs, after 4 ms of the vHub
+        ("", 20, 8, 28, 29, 29, SUPERVISOR),
+        ("", 40, 0, 21, 44, 41, "n1"),  # the 20 ms before belong to the clock
+    ],
+)
+def test_a_late_tick_is_blamed_on_the_longest_share(
+    waiting_for: str, released: int, busy: int, delivered: int, n1: int, n2: int, late: str
+) -> None:
+    """Times in ms. Tick 10 begins at 20 ms; its release is due at `released`, and then the supervisor is busy."""
+    settings = RunSettings("run", TABLE.name, with_nodes(TEXT, TABLE.name, 2), REALTIME)
+    monitor = ProgressMonitor(RunState(settings, bytes(32), "boot", "clock"), 0)
+    monitor.committed(10, 0, 0, 20 * MS)
+    monitor.released(10, released * MS)
+    monitor.took(released * MS, (released + busy) * MS)
+    for tick, cause in ((9, waiting_for), (7, DONE_OF + "player-blue")):
+        monitor.on_heartbeat(Heartbeat(VHUB, tick, 1, cause, "", 0.0, b""))
+    monitor.delivered(10, delivered * MS)
+    monitor.part(10, "n1", n1 * MS)
+    monitor.part(10, "n2", n2 * MS)
+    line = monitor.committed(11, 9 * MS, released * MS, max(n1, n2) * MS)
+    assert monitor.late == late and line == f"tick 11: lag 9.0 ms, waited for {late} (1 late ticks)"
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING
 
 import pytest
@@ -178,6 +179,26 @@ def test_the_quota_is_kept(hub_run: HubRun, tmp_path: Path) -> None:
         assert levels[-1:] == ([] if quota == 400 else [Level.OUT])
         if quota == 100:
             assert "of the 102400 B that it may have, the reserve is 12800 B" in writer.state.text
+
+
+def test_on_a_slow_disk_a_capture_is_closing_until_it_has_its_end(
+    hub_run: HubRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer, write = new_writer(tmp_path / "run.mcap", hub_run), capture_contents.write_all
+    gate, ended = Event(), Event()
+    room, writer.on_end = RoomWatch(writer, tmp_path, 1), ended.set
+    monkeypatch.setattr(limits, "CAPTURE_QUEUE_ROWS_MAX", 1_000_000)
+    monkeypatch.setattr(capture_file, "write_all", lambda file, content: gate.wait() and write(file, content))
+    for closing in hub_run.closings:
+        writer.keep(closing)
+    writer.begin_finish({"reason": "enough"})
+    before = room.recording
+    gate.set()
+    writer.finish()
+    after = room.recording
+    assert (before["state"], after["state"], ended.is_set()) == ("closing", "on", True)
+    assert before["written"] < before["offered"] == after["offered"] == after["written"]
+    assert before["bytes"] < after["bytes"] <= writer.path.stat().st_size
 
 
 def test_levels_of_room() -> None:
