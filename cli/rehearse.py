@@ -177,7 +177,9 @@ def check_component(text: str, file: Path, name: str, ticks: int, seed: int) -> 
     for note in check.notes:
         print(f"{label}: {note}")
     if not check.has_failed:
-        print(f"{check.compared} of {check.sensors} sensors of {file} measured, and were compared alone and with others")
+        print(
+            f"{check.compared} of {check.sensors} sensors of {file} measured, and were compared alone and with others"
+        )
     return FAILED if is_broken else DONE
 
 

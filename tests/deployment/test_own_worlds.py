@@ -190,8 +190,8 @@ KITS: Final = {
                                         f"{installed('rule')}, or any module:Class), 'fed'"],
     "rules={'feed': {'kind': 'feed', 'count': 'two'}}": ["its rule feed: count: not a whole number, 'two'"],
     "rules={'feed': {'kind': 'feed', 'coun': 2}}": ["its rule feed: unknown key, 'coun', nearest is 'count'"],
-    "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: there is no module own_none (it is neither beside the "
-                                               "deployment nor on PYTHONPATH), 'own_none:X', nearest is 'own_form:X'"],
+    "rules={'feed': {'kind': 'own_none:X'}}": ["its rule feed: there is no module own_none (it is not on PYTHONPATH), "
+                                               "'own_none:X', nearest is 'own_form:X'"],
     "rules={'feed': {'kind': 'in-hall'}}": ["its rule feed: rule of worlds of a hall in a world without one"],
     "spares=lambda section: {'leo': 'lion'}": ["its entity leo is of an unknown model: unknown model (there "
                                                f"are: {installed('model')}, or any module:Class), 'lion'"],

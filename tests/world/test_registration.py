@@ -99,14 +99,12 @@ def test_a_declaration_that_the_type_has_no_use_for_is_refused(site: Path, decla
         ("Sensor", "sample", "sensor('own', Settings, Number)"),
         ("Actuator", "command", "actuator('own', ActuatorSettings, Number)"),
         ("Modifier", "apply", "modifier('own', ModifierSettings)"),
-        ("Rule", "apply", "rule('own', RuleSettings)"),
-        ("EntityRule", "apply", "rule('own', EntityRuleSettings)"),
     ],
 )
 def test_a_class_with_a_misspelt_hook_is_refused(site: Path, base: str, hook: str, registration: str) -> None:
     written(site, f"class Kept({base}):", f"    def {hook}s(self, *given): pass", f"{registration}(Kept)")
     with pytest.raises(BadValue, match=f"the class Kept has no method {hook}, nearest is {hook}s"):
-        find(base.lower().replace("entityr", "entity_r"), "own_form:Kept")
+        find(base.lower(), "own_form:Kept")
 
 
 # --- slots that follow from settings ---------------------------------------------------------------------------------

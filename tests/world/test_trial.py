@@ -276,7 +276,7 @@ BROKEN: Final = {
     "a status that is none": (
         'return {"ticks": view.read(self.ticks)[0]}',
         "return None",
-        "rules.counts",
+        "rules: ",
         "status() returned None; expected a mapping of names to JSON values (own_parts.py:",
     ),
     "a status with an object": (

@@ -37,13 +37,7 @@ TYPES: Final[Mapping[str, Any]] = {
     "per_field": dict[str, float | None],
 }
 """The types of a description's fields."""
-REQUIRED: Final = {
-    "sensor": "sample",
-    "actuator": "command",
-    "modifier": "apply",
-    "rule": "apply",
-    "entity_rule": "apply",
-}
+REQUIRED: Final = {"sensor": "sample", "actuator": "command", "modifier": "apply"}
 """The hook without which a component has no effect, by type name."""
 
 
