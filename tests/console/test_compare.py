@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -82,3 +83,16 @@ def test_a_course_has_the_newest_point_a_hole_where_nobody_looked_and_forgets_wh
         told = course.take(tick, [])
     known = [at for at, metres in told["series"] if metres is None]
     assert told["entities"] == [] and known == [30, 60, 70], "of a hole the ends are kept"
+
+
+def test_a_long_course_is_thinned_and_keeps_its_beginning_and_its_holes() -> None:
+    course = Course()
+    for tick in range(10_000):
+        if tick == 5000:
+            course.interrupt()
+        series = course.take(2 * tick, [("ball", tick)])["series"]
+    ticks = [at for at, _ in series]
+    assert len(ticks) <= POINTS + 1 and ticks == sorted(set(ticks)) and (ticks[0], ticks[-1]) == (0, 19_998)
+    assert max(later - at for at, later in pairwise(ticks)) < 20_000 / POINTS * 4
+    (hole,) = (at for at, metres in series if metres is None)
+    assert 10_000 - 2 * 20_000 / POINTS < hole < 10_000

@@ -165,6 +165,15 @@ def test_epochs_moves_recoveries_requests_and_drops_are_marks(table: Deployment)
     assert len(timeline.news()) == MARKS_MAX - 1, "bounded"
 
 
+def test_drops_of_a_long_run_are_counted_in_longer_spans(table: Deployment) -> None:
+    timeline = Timeline(table)
+    drops = 20_000
+    for second in range(drops):
+        timeline.take_drop(second * SECOND_NS, "snr")
+    marks = timeline.news()
+    assert len(marks) <= 121 and sum(int(mark.text.split()[0]) for mark in marks) == drops
+
+
 def test_a_run_has_its_marks(history: CaptureHistory, table: Deployment) -> None:
     recording = history.recording
     rows = [recording.row(TICK, number) for number in range(TICKS + 1)]

@@ -17,6 +17,7 @@ from foosim.cli.net import linted
 from foosim.common.errors import DeploymentError
 from foosim.common.keyed_random import draw_words
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.settings_text import impairments_text
 from foosim.protocol.messages import Sent
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings, System
@@ -202,6 +203,12 @@ def test_a_capture_without_its_package(tmp_path: Path, foggy: Path, monkeypatch:
     refused = replay("what-if", tmp_path / "run.mcap", "--network", other)
     assert refused.code == 2 and refused.err.startswith(f"{other}:3:49: network.links[0].model.name: not a")
     assert replay("what-if", tmp_path / "run.mcap", "--set", "network.links.all.model=null").code == 0
+
+
+def test_the_text_of_a_link_has_its_model_with_the_parameters() -> None:
+    model = "model: {name: fog, parameters: {loss: many, late_ns: [1, {a: null}]}}"
+    (link,) = deployment_of(rule(f"{model}, loss: 1 %, order: free")).network.links
+    assert 'link model fog {"loss":"many","late_ns":[1,{"a":null}]}' in impairments_text(link)
 
 
 # --- what fails -------------------------------------------------------------------------------------------------------
