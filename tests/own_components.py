@@ -16,6 +16,7 @@ import pytest
 from foosim.common.errors import DeploymentError
 from foosim.deployment import loader
 from foosim.deployment.loader import apply_sets
+from foosim.world.assembly import versions
 from foosim.world.component_types import registry
 from tests.deployed import TABLE, TEXT
 
@@ -88,7 +89,8 @@ def folder_on_path(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def forget_modules() -> None:
     """Modules, and deployments that name theirs, are looked for anew: another one of the same name is elsewhere now."""
     loader._kept.clear()
-    for kept in (loader._applied, registry._entry_points):
+    of_versions = versions._version, versions._spec, versions._source, versions._imports, versions._folder
+    for kept in (loader._applied, registry._entry_points, *of_versions):
         kept.cache_clear()
     invalidate_caches()
 

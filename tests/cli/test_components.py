@@ -53,6 +53,9 @@ class Number(Struct, frozen=True):
 @sensor("bounded", Settings, Number)
 class Bounded(Sensor):
     """Has bounds."""
+
+    def sample(self, view):
+        return Number(0.0)
 '''
 
 

@@ -375,7 +375,7 @@ def test_the_end_says_how_many_sensors_were_compared(planted: Path, command: Com
     assert (done.code, done.err) == (0, "")
     there = sum(len(robot.sensors) for robot in load_deployment(TABLE.read_text(), TABLE.name).robots.values())
     *_, last = done.out.splitlines()
-    assert last == f"sensor own: {there} of {there + 1} sensors measured, and were compared alone and with others"
+    assert last == f"{there} of {there + 1} sensors of {TABLE} measured, and were compared alone and with others"
 
 
 FAILS_ELSEWHERE: Final = """

@@ -311,7 +311,7 @@ class Several(Struct, frozen=True):
 def test_an_actuator_that_cannot_do_jobs_is_not_registered(
     command: type[Struct], methods: Sequence[str], text: str
 ) -> None:
-    made = type("Made", (Actuator,), dict.fromkeys(methods, lambda self, view: RUNNING))
+    made = type("Made", (Actuator,), dict.fromkeys(("command", *methods), lambda self, view: RUNNING))
     with pytest.raises(Refused, match=text):
         actuator("of_no_jobs", ActuatorSettings, command, jobs=True)(made)
     assert registry.lookup("actuator", "of_no_jobs") is None
