@@ -28,7 +28,7 @@ SETTINGS_OF: Final[Mapping[str, str]] = {
     ModifierSettings.__name__: "modifier",
     EntityRuleSettings.__name__: "entity_rule",
 }
-"""Settings that are those of any component of a type name."""
+"""The type name of the components whose settings are of a class."""
 BOUNDS: Final[Mapping[str, str]] = {
     "minimum": "at least",
     "exclusiveMinimum": "more than",
@@ -38,7 +38,7 @@ BOUNDS: Final[Mapping[str, str]] = {
 
 
 def chosen(type_name: str | None, name: str | None) -> list[ComponentType]:
-    """Return the component types of a type name and name, or all of them. Raises UnknownName."""
+    """Return the component types with this type name and this name, or all of them. Raises UnknownName."""
     if type_name is not None and type_name not in TYPE_NAMES:
         named = (
             [one for one in TYPE_NAMES if registry.lookup(one, type_name) is not None] if ":" not in type_name else []

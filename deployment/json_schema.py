@@ -12,7 +12,7 @@ from foosim.world.component_types.settings import BASES, EntitySettings, RobotSe
 from foosim.world.spec import KITS
 
 OPEN: Final = {base.__name__: type_name for type_name, base in BASES.items()}
-"""Definitions that are placeholders for all component types of a type name."""
+"""The type name of the component types that a definition accepts."""
 OWN: Final = "foosim."
 REF: Final = "#/$defs/"
 

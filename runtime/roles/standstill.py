@@ -44,7 +44,7 @@ SILENT_NS: Final = 750_000_000
 
 
 def closed(silent_ns: int, what: str = "nothing was heard of it") -> str:
-    """Return the reason of a loss by a closed connection, after a silence of so long.
+    """Return the reason of a loss by a closed connection, after a silence of `silent_ns`.
 
     A process that ends closes its connection; one that is stopped, or cut off, is silent until its lease expires.
     """

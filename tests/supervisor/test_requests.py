@@ -340,7 +340,7 @@ BAD: Final[tuple[tuple[str, Mapping[str, Any], str], ...]] = (
     ("push", {"name": "bal", "impulse": [0, 0, 0]}, "no free body 'bal'; there are ball, nearest is ball"),
     ("push", {"name": 7, "impulse": [0, 0, 0]}, "name: a name is needed, not 7"),
     ("add", {}, "name: a name is needed, not null"),
-    ("add", {"name": "bal"}, "nothing to add (there are: ball, ball-2, ball-3, ball-4), 'bal', nearest is 'ball'"),
+    ("add", {"name": "bal"}, "no entity to add (there are: ball, ball-2, ball-3, ball-4), 'bal', nearest is 'ball'"),
     ("add", {"name": "ball-5"}, "ball-4), 'ball-5', nearest is 'ball"),
     ("add", {"name": "camera"}, "camera is always in the world: fixed entities and entities of a kit neither"),
     ("add", {"name": "world"}, "world is always in the world: "),

@@ -32,7 +32,7 @@ def absent_named(layout: Layout, numbers: Sequence[float], name: str) -> Entity:
     if name not in layout:
         stems = {found["fleet"] for entity in layout.entities if (found := _NUMBERED.fullmatch(entity.name))}
         known = [entity.name for entity in layout.entities if entity.can_leave]
-        raise Refused(UnknownName("nothing to add", name, [*known, *sorted(stems)]).what)
+        raise Refused(UnknownName("no entity to add", name, [*known, *sorted(stems)]).what)
     raise Refused(f"{name} is in the world already" if layout[name].can_leave else _always(name))
 
 
