@@ -87,6 +87,16 @@ JointKind: TypeAlias = Literal["free", "prismatic", "revolute", "continuous", "f
 
 
 @dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint follows another one: its position is `ratio` times that of the joint of the link `leader` (an index among
+    the links of the body), and `offset` (m or rad)."""
+
+    leader: int
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Link:
     """A rigid part that hangs on its parent by one joint.
 
@@ -97,7 +107,10 @@ class Link:
 
     `inertia` is the diagonal about the centre of mass, in the principal axes, whose orientation in the link's frame is
     `principal`. A motor of the joint has at most the force `effort` (N or N m) and the speed `speed` (m/s or rad/s);
-    `damping` is the resistance to its speed (N s/m or N m s/rad).
+    `damping` is the resistance to its speed (N s/m or N m s/rad). `joint_name` is what the joint is called; empty, it
+    is called as the link. With a `mimic` the joint has no motor of its own.
+
+    `visuals` is what the link looks like, with meshes of any form; where there are none it looks like its `shapes`.
     """
 
     name: str
@@ -115,6 +128,9 @@ class Link:
     effort: float = inf
     speed: float = inf
     damping: float = 0.0
+    joint_name: str = ""
+    mimic: Mimic | None = None
+    visuals: tuple[Shape, ...] = ()
 
     @property
     def is_centred(self) -> bool:
