@@ -50,6 +50,17 @@ def read_mesh(name: str, content: bytes, scale: float = 1.0) -> Mesh:
     return _checked(name, vertices, triangles)
 
 
+def read_parts(
+    name: str, content: bytes, triangles_max: int
+) -> list[tuple[NDArray[np.float64], NDArray[np.int32], tuple[float, float, float, float] | None]]:
+    """Return the mesh in a file's content, in parts of one material each, with its colour if it has one."""
+    suffix = name[name.rfind(".") :].lower()
+    if suffix not in MESH_SUFFIXES:
+        raise AssetError(f"{name}: {describe('no format of a mesh', suffix)}, there are {', '.join(MESH_SUFFIXES)}")
+    vertices, triangles = _READERS[suffix](name, content)
+    return [(vertices, triangles, None)]
+
+
 def pieces(mesh: Mesh, triangles_max: int) -> Iterator[Mesh]:
     """Yield a mesh, or, if it has more triangles, its parts."""
     if len(mesh.triangles) <= triangles_max:
