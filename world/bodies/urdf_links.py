@@ -35,7 +35,7 @@ from foosim.world.bodies.urdf_values import (
     vector_of,
 )
 from foosim.world.bodies.xml_tree import Element
-from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError
+from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, mesh_format
 from foosim.world.scene import (
     ORIGIN,
     UPRIGHT,
@@ -97,7 +97,7 @@ def mesh_path(mesh: Element) -> str:
     problem = path_problem(path)
     if problem:
         raise mesh.error(problem, written)
-    if path[path.rfind(".") :].lower() not in MESH_SUFFIXES:
+    if not mesh_format(path):
         raise mesh.error(f"no format of a mesh, there are {', '.join(MESH_SUFFIXES)}", written)
     return path
 
