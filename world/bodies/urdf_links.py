@@ -55,6 +55,7 @@ from foosim.world.scenery import path_problem
 SCALE_MIN: Final = 1e-6
 SCALE_MAX: Final = 1e6
 PACKAGE: Final = "package://"
+MISSING: Final = "the file of a mesh is missing"
 PRIMITIVES: Final = ("box", "sphere", "cylinder", "capsule")
 SHAPES: Final = (*PRIMITIVES, "mesh")
 
@@ -238,7 +239,7 @@ def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
 
     path = mesh_path(mesh)
     if path not in files:
-        raise mesh.error("the file of a mesh is missing", path)
+        raise mesh.error(MISSING, path)
     scale = scale_of(mesh)
     most = max(abs(part) for part in scale)
     try:
