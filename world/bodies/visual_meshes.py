@@ -29,6 +29,8 @@ SPARED: Final = 16
 COLOURS_MAX: Final = 64
 GRIDS: Final = (256, 128, 64, 32, 16)
 """Cells along the longest side of a mesh."""
+FAR: Final = 1e9
+"""No coordinate is that far out; the unit may be anything until it is scaled."""
 BAD: Final = "no drawn form of a mesh"
 
 
@@ -66,6 +68,8 @@ def drawn_content(name: str, content: bytes, triangles_max: int = TRIANGLES_MAX)
         parts = read_parts(name, content, limits.VISUAL_TRIANGLES_MAX)
     except AssetError as error:
         return undrawn_content(str(error))
+    if not all(abs(vertices).max(initial=0.0) < FAR for vertices, _, _ in parts):  # nan is not, either
+        return undrawn_content(f"{name}: a coordinate is too large or not finite")
     return _packed(parts, triangles_max)
 
 
