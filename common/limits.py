@@ -57,6 +57,10 @@ ASSETS_BYTES_MAX: Final = 64 * 1024 * 1024
 ASSET_PIECE_BYTES: Final = 1024 * 1024
 """The piece of such a file in one message."""
 MESH_TRIANGLES_MAX: Final = 200_000
+VISUAL_BYTES_MAX: Final = 64 * 1024 * 1024
+"""A file of a mesh that is only drawn: it becomes a small one before it is part of a deployment."""
+VISUAL_TRIANGLES_MAX: Final = 2_000_000
+"""A mesh that is only drawn, before it is made small."""
 SCENERY_TRIANGLES_MAX: Final = 400_000
 """All meshes of a world: they go to a viewer in one message, which fits one chunk of a capture."""
 
