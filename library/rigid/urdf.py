@@ -121,8 +121,11 @@ class Urdf(Model):
 
 
 def starts_of(body: Body) -> list[float]:
-    """Return where the joints of a body start: at 0, or at the limit that is nearest to it; those that follow another
-    one where that has them, whose start is within their limits where there is one."""
+    """Return where the joints of a body start: at 0, or at the limit that is nearest to it.
+
+    A mimic joint starts where its leader has it; the leader starts where all its followers are within their limits, if
+    there is such a place.
+    """
     found = {}
     for index, link in enumerate(body.links):
         low, high = _limits(link)

@@ -54,7 +54,7 @@ slips by 0.01 mm, and by 16 mm without."""
 TOLERANCE: Final = 1e-10
 """At 1e-8 wheels that hold each other slip."""
 MIMIC_TOLERANCE: Final = 1e-14
-"""With mimic joints: at 1e-10 the solver stops too early where a motor reaches its speed, 2.7 mrad beside the coupling."""
+"""With mimic joints: at 1e-10 the solver ends too early where a motor reaches its speed, with an error of 2.7 mrad."""
 LINE_SEARCHES: Final = 50
 HARD: Final = (0.0, 0.99, 0.001, 0.5, 2.0)
 """`solimp` of contacts without restitution: impedance 0 at the touch, 0.99 from an overlap of 1 mm on. A sliding
