@@ -87,7 +87,7 @@ def pieces(mesh: Mesh, triangles_max: int) -> Iterator[Mesh]:
 @lru_cache(maxsize=CLOSED_KEPT)
 def is_closed(mesh: Mesh) -> bool:
     """True if it has an inside: each edge is one of an even number of triangles, by the places of its ends."""
-    corners = _merged(mesh.vertices[mesh.triangles].reshape(-1, 3))[1].astype(np.int64)
+    corners = merged(mesh.vertices[mesh.triangles].reshape(-1, 3))[1].astype(np.int64)
     edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)
     _, counts = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
     return bool((counts % 2 == 0).all())
@@ -207,7 +207,7 @@ def _read_stl(name: str, content: bytes, triangles_max: int) -> tuple[NDArray[np
         size = f"a binary one has at least {_STL_HEAD} bytes"
     if content.lstrip()[:5] != b"solid" or b"\0" in content:
         raise AssetError(f"{name}: no STL file: it has {len(content)} bytes and {size}, a text one begins with solid")
-    return _merged(_vertices(list(_read_facets(name, content, triangles_max))))
+    return merged(_vertices(list(_read_facets(name, content, triangles_max))))
 
 
 def _read_binary(
@@ -219,7 +219,7 @@ def _read_binary(
     bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
     if len(bad):
         raise AssetError(f"{name}: triangle {bad[0] + 1} has a non-finite coordinate")
-    return _merged(corners.reshape(-1, 3))
+    return merged(corners.reshape(-1, 3))
 
 
 _FACET: Final = (
@@ -258,7 +258,7 @@ def _read_facets(name: str, content: bytes, triangles_max: int) -> Iterator[tupl
         raise AssetError(f"{name}:{line}: the file ends within {'a facet' if step else 'the solid'}")
 
 
-def _merged(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def merged(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Return vertices and triangles of three corners each: corners equal to the last bit are one vertex."""
     rows = np.ascontiguousarray(corners + 0.0).view("V24").ravel()  # compared as bytes: five times as fast as by axis
     vertices, index = np.unique(rows, return_inverse=True)

@@ -1,7 +1,7 @@
 """Whether the base of a robot is fixed, as its file suggests: a proposal, for a URDF does not say it.
 
 A base is free where nothing moves in it (an object), where it has two or more links at ends that turn without limits
-(wheels, rotors), and where it stands on two or more moving parts (legs): the lowest point of each of these is the lowest
+about their middles (wheels, rotors), and where it stands on two or more moving parts (legs): the lowest point of each of these is the lowest
 of the robot. It is fixed in all other cases (arms, grippers, pendulums), where the first link is called `world`, and
 where it has no mass.
 """
@@ -12,10 +12,13 @@ from dataclasses import replace
 from typing import Final
 
 from foosim.world.bodies.urdf import Robot, free_base_problem, poses_of
-from foosim.world.scene import MOVING, place, shape_box
+from foosim.world.scene import MOVING, Link, cross, dot, place, shape_box
 
 WHEELS_MIN: Final = 2
 """One joint that turns without end may be the last one of an arm."""
+UNBALANCE: Final = 0.05
+"""The greatest share that the distance of its centre of mass from its axis has in the inertia of a wheel: a shin that
+turns without end has more."""
 LEGS_MIN: Final = 2
 LEVEL: Final = 0.05
 """The share of a robot's height by which the lowest points of its legs may differ."""
@@ -31,7 +34,7 @@ def base_of(robot: Robot) -> tuple[bool, str]:
         return False, "nothing in it moves, it is an object"
     wheels = wheels_of(robot)
     if wheels:
-        return False, f"{len(wheels)} joints turn without end and carry no others, as of wheels and rotors"
+        return False, f"{len(wheels)} links turn without end, as wheels and rotors do"
     legs = _legs(robot)
     if legs >= LEGS_MIN:
         return False, f"it stands on {legs} moving links"
@@ -39,16 +42,25 @@ def base_of(robot: Robot) -> tuple[bool, str]:
 
 
 def wheels_of(robot: Robot) -> list[str]:
-    """Return the joints of wheels, of which there are several: links that turn without end and carry no moving ones."""
+    """Return the joints of wheels, of which there are several: links that turn without end, balanced about their axes,
+    and carry no moving ones."""
     carriers: set[int] = set()
     for link in robot.links:
         parent = link.parent if link.joint in MOVING else -1
         while parent >= 0:
             carriers.add(parent)
             parent = robot.links[parent].parent
-    turning = [number for number, link in enumerate(robot.links) if link.joint == "continuous" and link.mimic is None]
-    wheels = [robot.joints[number] for number in turning if number not in carriers]
+    wheels = [
+        link.joint_name
+        for number, link in enumerate(robot.links)
+        if link.joint == "continuous" and link.mimic is None and number not in carriers and _is_balanced(link)
+    ]
     return wheels if len(wheels) >= WHEELS_MIN else []
+
+
+def _is_balanced(link: Link) -> bool:
+    arm = cross(link.axis, link.centre_of_mass)
+    return link.mass * dot(arm, arm) <= UNBALANCE * max(link.inertia)
 
 
 def height_of(robot: Robot) -> float:

@@ -58,6 +58,7 @@ SCALE_MAX: Final = 1e6
 HULLS_KEPT: Final = 64
 """The count of hulls that are kept: legs, wheels and fingers share files, and so do variants of a robot."""
 PACKAGE: Final = "package://"
+MISSING: Final = "the file of a mesh is missing"
 PRIMITIVES: Final = ("box", "sphere", "cylinder", "capsule")
 SHAPES: Final = (*PRIMITIVES, "mesh")
 
@@ -238,7 +239,7 @@ def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
     """Return the convex hull of a mesh's file: bodies are convex."""
     path = mesh_path(mesh)
     if path not in files:
-        raise mesh.error("the file of a mesh is missing", path)
+        raise mesh.error(MISSING, path)
     scale = scale_of(mesh)
     try:
         return _hull_of(path, files[path], scale)

@@ -26,6 +26,7 @@ TRIANGLES_MAX: Final = 5_000
 """Of a mesh in drawn form."""
 SPARED: Final = 16
 """A part of a mesh keeps as many triangles, where it has them, however few its share would be."""
+COLOURS_MAX: Final = 64
 BAD: Final = "no drawn form of a mesh"
 
 
@@ -72,9 +73,9 @@ def undrawn_content(problem: str) -> bytes:
 
 
 def drawn_parts(content: bytes) -> tuple[list[Part], str]:
-    """Return the parts of a mesh in drawn form, in m, each with its own colour if it has one; and why there are none.
+    """Return the parts of a mesh in drawn form, in m, each with its own colour if it has one; and a remark.
 
-    A content that is no drawn form has none.
+    The remark is why there are none, or how coarse they are; empty for a mesh that is whole.
     """
     import numpy as np
 
@@ -84,39 +85,52 @@ def drawn_parts(content: bytes) -> tuple[list[Part], str]:
         for part in drawn.parts:
             vertices = np.frombuffer(part.vertices, "<f4").reshape(-1, 3).astype(np.float64)
             triangles = np.frombuffer(part.triangles, "<u2").reshape(-1, 3).astype(np.int32)
-            if not np.isfinite(vertices).all() or triangles.max(initial=-1) >= len(vertices) or not len(triangles):
+            if not len(triangles) or triangles.max() >= len(vertices) or not np.isfinite(vertices).all():
                 return [], BAD
             parts.append((vertices, triangles, part.colour))
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, ValueError):
         return [], BAD
-    return parts, drawn.problem
-
-
-def drawn_note(name: str, content: bytes) -> str:
-    """Return what is to know of a mesh's drawn form: why there is none, or how coarse it is; empty if it is whole."""
-    parts, problem = drawn_parts(content)
-    if problem:
-        return f"{name}: not drawn, {problem}"
-    drawn, whole = sum(len(triangles) for _, triangles, _ in parts), msgspec.msgpack.decode(content, type=_Drawn).triangles
-    return f"{name}: drawn with {drawn:,} of {whole:,} triangles" if drawn < whole else ""
+    count = sum(len(triangles) for _, triangles, _ in parts)
+    coarse = f"{count:,} of {drawn.triangles:,} triangles are drawn" if count < drawn.triangles else ""
+    return parts, drawn.problem or coarse
 
 
 def _packed(parts: list[Part], triangles_max: int) -> bytes:
     whole = sum(len(triangles) for _, triangles, _ in parts)
     share = min(1.0, triangles_max / whole) if whole else 1.0
     packed = []
-    for vertices, triangles, colour in parts:
+    for colour, (vertices, triangles) in _by_colour(parts).items():
         vertices, triangles = _decimated(vertices, triangles, max(int(len(triangles) * share), SPARED))
         if len(triangles):
             packed.append(_DrawnPart(vertices.astype("<f4").tobytes(), triangles.astype("<u2").tobytes(), colour))
     return msgspec.msgpack.encode(_Drawn(whole, packed))
 
 
+def _by_colour(parts: list[Part]) -> dict[Colour | None, tuple[NDArray[np.float64], NDArray[np.int32]]]:
+    """Return the triangles of each colour, with corners at one place as one; of too many colours the first ones."""
+    import numpy as np
+    from foosim.world.mesh_files import merged
+
+    corners: dict[Colour | None, list[NDArray[np.float64]]] = {}
+    for vertices, triangles, colour in parts:
+        known = colour if colour in corners or len(corners) < COLOURS_MAX else next(iter(corners))
+        corners.setdefault(known, []).append(vertices[triangles].reshape(-1, 3))
+    return {colour: merged(np.concatenate(found)) for colour, found in corners.items()}
+
+
 def _decimated(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], most: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Return a mesh with at most so many triangles: fewer by joining corners, and then the largest ones alone."""
     if len(triangles) <= most:
         return vertices, triangles
     import fast_simplification
+    import numpy as np
 
-    return fast_simplification.simplify(vertices, triangles, target_count=most)
+    vertices, triangles = fast_simplification.simplify(vertices, triangles, target_count=most)
+    if len(triangles) > most:
+        one, other, third = (vertices[triangles[:, corner]] for corner in range(3))
+        areas = np.linalg.norm(np.cross(other - one, third - one), axis=1)
+        triangles = triangles[np.sort(np.argsort(-areas, kind="stable")[:most])]
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    return vertices[used], renumbered.reshape(-1, 3).astype(np.int32)
