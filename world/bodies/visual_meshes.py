@@ -27,6 +27,8 @@ TRIANGLES_MAX: Final = 5_000
 SPARED: Final = 16
 """A part of a mesh keeps as many triangles, where it has them, however few its share would be."""
 COLOURS_MAX: Final = 64
+GRIDS: Final = (256, 128, 64, 32, 16)
+"""Cells along the longest side of a mesh."""
 BAD: Final = "no drawn form of a mesh"
 
 
@@ -121,16 +123,21 @@ def _by_colour(parts: list[Part]) -> dict[Colour | None, tuple[NDArray[np.float6
 def _decimated(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], most: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Return a mesh with at most so many triangles: fewer by joining corners, and then the largest ones alone."""
+    """Return a mesh with at most so many triangles: corners are joined by a library, which keeps to the surface, and
+    where its pieces are too small for that, those in one cell of a grid."""
     if len(triangles) <= most:
         return vertices, triangles
     import fast_simplification
     import numpy as np
+    from foosim.world.mesh_files import merged
 
     vertices, triangles = fast_simplification.simplify(vertices, triangles, target_count=most)
-    if len(triangles) > most:
-        one, other, third = (vertices[triangles[:, corner]] for corner in range(3))
-        areas = np.linalg.norm(np.cross(other - one, third - one), axis=1)
-        triangles = triangles[np.sort(np.argsort(-areas, kind="stable")[:most])]
-    used, renumbered = np.unique(triangles, return_inverse=True)
+    low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
+    for cells in GRIDS:
+        if len(triangles) <= most:
+            break
+        nodes = low + np.round((vertices - low) * (cells / size)) * (size / cells)
+        vertices, triangles = merged(nodes[triangles].reshape(-1, 3))
+        triangles = triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]
+    used, renumbered = np.unique(triangles[:most], return_inverse=True)
     return vertices[used], renumbered.reshape(-1, 3).astype(np.int32)
