@@ -103,8 +103,8 @@ mujoco.set_mju_user_warning(_warned)  # by default MuJoCo writes MUJOCO_LOG.TXT 
 
 
 def is_mover(body: Body) -> bool:
-    """Whether a body has no mass: others are pushed by it, and it is moved by none."""
-    return all(link.mass == 0.0 for link in body.links)
+    """Whether a free body has no mass: others are pushed by it, and it is moved by none."""
+    return body.is_free and all(link.mass == 0.0 for link in body.links)
 
 
 class Placed:
@@ -254,7 +254,7 @@ class ModelBuilder:
                 if index == 0:
                     made.explicitinertial, made.mass, made.inertia = True, HEAVY, (HEAVY,) * 3
             elif link.mass > 0.0:
-                made.explicitinertial, made.mass, made.inertia = True, link.mass, link.inertia
+                made.explicitinertial, made.mass, made.inertia = True, link.mass, _possible(link.inertia)
                 if made is not base:
                     made.ipos, made.iquat = link.centre_of_mass, _wxyz(link.principal)
             parents.append((made, at, turned, is_fixed))
@@ -371,6 +371,12 @@ def _holding(bodies: Sequence[Body], welds: Sequence[tuple[int, int, int]]) -> d
         for index in beside:
             found.setdefault((holder, index), set()).add(held)
     return found
+
+
+def _possible(moments: Vector) -> Vector:
+    """Return principal moments of which none is above the sum of both others: MuJoCo allows no rounding of a file."""
+    x, y, z = moments
+    return min(x, y + z), min(y, x + z), min(z, x + y)
 
 
 def _wxyz(q: Quaternion) -> tuple[float, float, float, float]:

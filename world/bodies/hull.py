@@ -9,7 +9,10 @@ points, to a few millionths of its length, the resolution of the grid.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from hashlib import blake2b
+from heapq import heappop, heappush
+from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -33,7 +36,7 @@ def convex_hull(points: Floats, corners_max: int = CORNERS_MAX) -> Mesh:
 
     Raises BadValue for points that lie in a plane.
     """
-    points = np.unique(np.ascontiguousarray(points, dtype=np.float64) + 0.0, axis=0)
+    points = _different(np.ascontiguousarray(points, dtype=np.float64) + 0.0)
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max())
     if len(points) < 4 or not extent > 0.0:
@@ -49,17 +52,32 @@ def convex_hull(points: Floats, corners_max: int = CORNERS_MAX) -> Mesh:
     return Mesh(vertices, found, blake2b(vertices.tobytes() + found.tobytes(), digest_size=32).digest())
 
 
+def _different(points: Floats) -> Floats:
+    """Return points sorted by x, y and z, each once."""
+    points = points[np.lexsort((points[:, 2], points[:, 1], points[:, 0]))]
+    first = np.ones(len(points), dtype=bool)
+    (points[1:] != points[:-1]).any(axis=1, out=first[1:])
+    return points[first]
+
+
 class _Face:
-    """A triangle of the hull: corners, the neighbour beyond each edge (corner i to i + 1), and the points outside."""
+    """A triangle of the hull: corners, the neighbour beyond each edge (corner i to i + 1), and the points outside.
 
-    __slots__ = ("corners", "far", "neighbours", "outside")
+    `normal` points outwards and is as long as twice the area, `level` is its product with a corner, in steps.
+    """
 
-    def __init__(self, corners: tuple[int, int, int]) -> None:
+    __slots__ = ("corners", "far", "level", "neighbours", "normal", "outside")
+
+    def __init__(self, corners: tuple[int, int, int], places: Mapping[int, tuple[int, int, int]]) -> None:
         self.corners = corners
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (places[corner] for corner in corners)
+        ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+        nx, ny, nz = self.normal = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        self.level = nx * ax + ny * ay + nz * az
         self.neighbours = [-1, -1, -1]
         self.outside: Ints = np.zeros(0, dtype=np.int64)
-        self.far = (0.0, -1)
-        """How far away the farthest of those points is, in steps, and which it is."""
+        self.far = -1
+        """The farthest of those points."""
 
 
 class _Building:
@@ -67,9 +85,13 @@ class _Building:
 
     def __init__(self, grid: Ints, four: tuple[int, int, int, int]) -> None:
         self.grid = grid
+        self._x, self._y, self._z = np.ascontiguousarray(grid.T)
         self.count = 4
         self.faces: dict[int, _Face] = {}
         self._next = 0
+        self._places = {corner: self._place(corner) for corner in four}
+        self._farthest: list[tuple[float, int]] = []
+        """A heap of the faces with points outside, also of some that are gone: their distance, negative, and key."""
         a, b, c, d = four
         keys = [self._add(corners) for corners in ((a, b, c), (a, d, b), (b, d, c), (c, d, a))]
         self._join(keys)
@@ -77,13 +99,15 @@ class _Building:
 
     def grow(self) -> bool:
         """Add the point that is farthest outside as a corner; False when no point is outside."""
-        far, key = max(((face.far[0], -key) for key, face in self.faces.items()), default=(0.0, 0))
-        if far <= 0.0:
+        while self._farthest and self._farthest[0][1] not in self.faces:
+            heappop(self._farthest)
+        if not self._farthest:
             return False
-        start, self.count = -key, self.count + 1
-        corner = self.faces[start].far[1]
+        start, self.count = self._farthest[0][1], self.count + 1
+        corner = self.faces[start].far
+        self._places[corner] = self._place(corner)
         seen, horizon = self._horizon(start, corner)
-        orphans = np.sort(np.concatenate([self.faces[key].outside for key in seen]))
+        orphans = np.concatenate([self.faces[key].outside for key in seen])
         for key in seen:
             del self.faces[key]
         keys = []
@@ -102,14 +126,12 @@ class _Building:
         self._share_out(orphans, keys)
         return True
 
-    def normal(self, face: _Face) -> tuple[int, int, int]:
-        """Return the normal of a face, outwards, as long as twice its area in steps."""
-        a, b, c = (self.grid[corner] for corner in face.corners)
-        (ux, uy, uz), (vx, vy, vz) = (b - a).tolist(), (c - a).tolist()
-        return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    def _place(self, point: int) -> tuple[int, int, int]:
+        x, y, z = self.grid[point].tolist()
+        return x, y, z
 
     def _add(self, corners: tuple[int, int, int]) -> int:
-        self.faces[self._next] = _Face(corners)
+        self.faces[self._next] = _Face(corners, self._places)
         self._next += 1
         return self._next - 1
 
@@ -120,38 +142,35 @@ class _Building:
             corners = self.faces[key].corners
             self.faces[key].neighbours = [edges[corners[i - 2], corners[i]] for i in range(3)]
 
-    def _heights(self, face: _Face, points: Ints) -> tuple[Ints, float]:
-        """Return six volumes over a face, above 0 outside, of points; and twice the area of the face."""
-        nx, ny, nz = self.normal(face)
-        offset = self.grid[points] - self.grid[face.corners[0]]
-        volumes = nx * offset[:, 0] + ny * offset[:, 1] + nz * offset[:, 2]
-        x, y, z = float(nx), float(ny), float(nz)
-        return volumes, float(np.sqrt(x * x + y * y + z * z))
-
     def _share_out(self, points: Ints, keys: list[int]) -> None:
         """Give each point to the first face that it is outside of; those within all are dropped."""
         for key in keys:
             face = self.faces[key]
             if len(points) == 0:
                 return
-            volumes, area = self._heights(face, points)
-            out = volumes > 0
-            if out.any():
+            nx, ny, nz = face.normal
+            volumes = nx * self._x[points] + ny * self._y[points] + nz * self._z[points] - face.level
+            greatest = int(volumes.max())
+            if greatest > 0:
+                out = volumes > 0
                 face.outside = points[out]
-                farthest = int(np.argmax(volumes[out]))
-                face.far = float(volumes[out][farthest]) / area, int(face.outside[farthest])
+                face.far = int(points[volumes == greatest].min())
+                x, y, z = map(float, face.normal)
+                heappush(self._farthest, (-(greatest / sqrt(x * x + y * y + z * z)), key))
                 points = points[~out]
 
     def _horizon(self, start: int, corner: int) -> tuple[list[int], list[tuple[int, int, int]]]:
         """Return the faces that a point sees, and the edges around them (from, to, the face beyond)."""
-        point = np.array([corner])
+        x, y, z = self._places[corner]
         seen, order, horizon = {start}, [start], []
         for key in order:
             face = self.faces[key]
             for neighbour in face.neighbours:
                 if neighbour in seen:
                     continue
-                if self._heights(self.faces[neighbour], point)[0][0] > 0:
+                beyond = self.faces[neighbour]
+                nx, ny, nz = beyond.normal
+                if nx * x + ny * y + nz * z > beyond.level:
                     seen.add(neighbour)
                     order.append(neighbour)
         for key in order:
@@ -193,7 +212,7 @@ def _around(points: Floats, vertices: Floats, building: _Building) -> Floats:
     scale = 1.0
     for key in sorted(building.faces):
         face = building.faces[key]
-        x, y, z = map(float, building.normal(face))
+        x, y, z = map(float, face.normal)
         reach = x * offset[0] + y * offset[1] + z * offset[2]
         height, farthest = max(reach[[*face.corners]].tolist()), float(reach.max())
         if farthest > height * scale:

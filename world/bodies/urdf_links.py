@@ -5,6 +5,7 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from foosim.common.errors import BadValue
@@ -54,6 +55,8 @@ from foosim.world.scenery import path_problem
 
 SCALE_MIN: Final = 1e-6
 SCALE_MAX: Final = 1e6
+HULLS_KEPT: Final = 64
+"""The count of hulls that are kept: legs, wheels and fingers share files, and so do variants of a robot."""
 PACKAGE: Final = "package://"
 MISSING: Final = "the file of a mesh is missing"
 PRIMITIVES: Final = ("box", "sphere", "cylinder", "capsule")
@@ -236,21 +239,25 @@ def primitive(shape: Element) -> Box | Sphere | Cylinder | Capsule:
 
 def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
     """Return the convex hull of a mesh's file: bodies are convex."""
-    from foosim.world.bodies.hull import convex_hull  # brings numpy
-    from foosim.world.mesh_files import read_mesh
-
     path = mesh_path(mesh)
     if path not in files:
         raise mesh.error(MISSING, path)
     scale = scale_of(mesh)
-    most = max(abs(part) for part in scale)
     try:
-        points = read_mesh(path, files[path], most).vertices
-        return Hull(convex_hull(points * [part / most for part in scale]))
+        return _hull_of(path, files[path], scale)
     except AssetError as error:
         raise mesh.error(f"an invalid mesh: {error}") from None
     except BadValue as bad:
         raise mesh.error(f"a mesh without a convex hull: {bad.problem}", path) from None
+
+
+@lru_cache(maxsize=HULLS_KEPT)
+def _hull_of(path: str, content: bytes, scale: Vector) -> Hull:
+    from foosim.world.bodies.hull import convex_hull  # brings numpy
+    from foosim.world.mesh_files import read_mesh
+
+    most = max(abs(part) for part in scale)
+    return Hull(convex_hull(read_mesh(path, content, most).vertices * [part / most for part in scale]))
 
 
 def scale_of(mesh: Element) -> Vector:

@@ -1,0 +1,73 @@
+"""A public robot on a floor, by the entry that `foosim urdf` proposes, stepped by hand."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any, Final, Self
+
+import yaml
+
+from foosim import Simulation
+from foosim.deployment.assets import pin_assets, read_robot
+from foosim.deployment.loader import load_deployment
+from foosim.world.bodies.urdf_text import snippet
+from foosim.world.frame import Frame
+from foosim.world.scene import Body
+from tests.corpus.test_corpus import needed
+
+NAME: Final = "corpus.yaml"
+TICK_S: Final = 0.01
+SUBSTEPS: Final = 4
+
+
+class Running:
+    """A robot of the corpus in a world of its own."""
+
+    def __init__(self, which: str, path: str, entry: Mapping[str, Any] | None = None) -> None:
+        """`entry` has what differs from the proposed one."""
+        folder = needed(which)
+        ((self.name, proposed),) = yaml.safe_load(snippet(read_robot(folder / path, folder)))["robots"].items()
+        text = {
+            "format": 2,
+            "world": "corpus",
+            "seed": 1,
+            "tick": f"{TICK_S * 1e3:g} ms",
+            "substeps": SUBSTEPS,
+            "engine": "mujoco",
+            "pace": "fast",
+            "scene": {"kind": "empty"},
+            "robots": {self.name: {**proposed, **(entry or {})}},
+            "nodes": {"one": {"robots": [self.name]}},
+            "network": {"links": [{"id": "all", "from": "*", "to": "*"}]},
+        }
+        pinned, files = pin_assets(yaml.safe_dump(json.loads(json.dumps(text)), sort_keys=False), NAME, folder)
+        self.simulation = Simulation(load_deployment(pinned, NAME).with_assets(files))
+        self.body: Body = self.simulation.scene.bodies[self.name]
+        self.joints = [link.joint_name or link.name.removeprefix(f"{self.name}/") for link in self.body.joints]
+
+    def put(self, **fields: list[float]) -> None:
+        """Begin with other numbers of its fields."""
+        frame = self.simulation.frame
+        numbers = [*frame.numbers]
+        for field, values in fields.items():
+            at = frame.layout[self.name].offsets[field]
+            numbers[at : at + len(values)] = values
+        self.simulation.reset(Frame(frame.tick, frame.layout, None, frame.outboxes, numbers=numbers))
+
+    def __getitem__(self, field: str) -> list[float]:
+        """Return the numbers of one of its fields, now."""
+        entity = self.simulation.frame.layout[self.name]
+        at = entity.offsets[field]
+        return self.simulation.frame.numbers[at : at + entity.counts[field]]
+
+    def step(self, seconds: float, command: Any = None) -> None:
+        """Send a command, and compute some time."""
+        self.simulation.step({} if command is None else {self.name: command}, round(seconds / TICK_S))
+        assert not self.simulation.quarantined, self.simulation.quarantined
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.simulation.close()

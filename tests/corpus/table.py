@@ -1,0 +1,90 @@
+"""What foosim reads of public robots: `python -m tests.corpus.table` writes table.txt, which a test compares.
+
+Each line has a file by its place in its package, and what `foosim urdf` says of it: its links, the joints that move,
+its mass and how many notes it has; or why it is refused, by its first error.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from typing import Final
+
+from foosim.common.errors import Refused
+from foosim.deployment.assets import read_robot
+from foosim.world.bodies.urdf import SUFFIX, Robot
+
+HERE: Final = Path(__file__).parent
+TABLE: Final = HERE / "table.txt"
+PUBLIC: Final = {
+    "example-robot-data": ("example-robot-data", "cmeel.prefix/share/example-robot-data/robots"),
+    "pybullet_data": ("pybullet", "pybullet_data"),
+}
+"""Sets of robots on PyPI: the distribution that has each, and its folder among the installed packages."""
+OWN: Final = "files"
+"""Those of this folder."""
+SETS: Final = (*PUBLIC, OWN)
+ALIKE: Final = "random_urdfs"
+"""A folder of a thousand objects, of one form."""
+
+
+def folder_of(which: str) -> Path | None:
+    """Return the folder of a set of robots, None where it is not installed."""
+    if which == OWN:
+        return HERE / OWN
+    package, inside = PUBLIC[which]
+    try:
+        folder = Path(str(distribution(package).locate_file(inside)))
+    except PackageNotFoundError:
+        return None
+    return folder if folder.is_dir() else None
+
+
+def lines_of(which: str, folder: Path) -> list[str]:
+    """Return the lines of a set."""
+    paths = sorted(path.relative_to(folder) for path in folder.rglob(f"*{SUFFIX}"))
+    return [f"{which}/{path.as_posix()}: {found(folder / path).replace(str(folder), which)}" for path in paths if path.parts[0] != ALIKE]
+
+
+def found(file: Path) -> str:
+    """Return what is read of a file, or why it is refused."""
+    try:
+        return described(read_robot(file, None))
+    except Refused as error:
+        first = str(error).splitlines()[0].removeprefix(f"{file.name}:")
+        return f"refused, line {first}"
+
+
+def described(robot: Robot) -> str:
+    """Return the links, the moving joints, the mass and the notes of a robot."""
+    counts = ((len(robot.links), "link"), (len(robot.moving), "joint"), (len(robot.notes), "note"))
+    links, joints, notes = (f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts)
+    return f"{links}, {joints}, {robot.mass:.4g} kg, {notes}"
+
+
+def table() -> dict[str, list[str]]:
+    """Return the lines of the table by set, without empty ones."""
+    lines = TABLE.read_text(encoding="utf-8").splitlines()
+    return {which: [line for line in lines if line.startswith(f"{which}/")] for which in SETS}
+
+
+def written() -> Iterator[str]:
+    """Yield the lines of the table as it is now; those of a set that is not installed stay."""
+    before = table() if TABLE.exists() else {}
+    for which in SETS:
+        folder = folder_of(which)
+        if folder is None:
+            print(f"{which} is not installed: its lines stay", file=sys.stderr)
+        yield from before[which] if folder is None else lines_of(which, folder)
+        yield ""
+
+
+def main() -> None:
+    """Write the table."""
+    TABLE.write_text("\n".join(written()).rstrip() + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

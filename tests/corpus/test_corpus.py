@@ -1,0 +1,38 @@
+"""Public robots, and small ones of the forms that are rare: each is read or refused as the table has it."""
+
+from __future__ import annotations
+
+import os
+from difflib import unified_diff
+from pathlib import Path
+
+import pytest
+
+from tests.corpus.table import PUBLIC, SETS, folder_of, lines_of, table
+
+READ_MIN = 0.8
+"""The least share of public robots that are read as they are."""
+
+
+def needed(which: str) -> Path:
+    """Return the folder of a set of robots. Without it a test is skipped; with CI in the environment it fails."""
+    folder = folder_of(which)
+    if folder is None:
+        reason = f"{which} is not installed: `make test` installs it, on Python 3.11"
+        assert not os.environ.get("CI"), reason
+        pytest.skip(reason)
+    return folder
+
+
+@pytest.mark.parametrize("which", SETS)
+def test_robots_are_read_or_refused_as_the_table_says(which: str) -> None:
+    before, now = table()[which], lines_of(which, needed(which))
+    changes = "\n".join(unified_diff(before, now, "tests/corpus/table.txt", "as read now", lineterm="", n=0))
+    assert not changes, f"`python -m tests.corpus.table` writes the table anew:\n{changes}"
+
+
+def test_most_public_robots_are_read_as_they_are() -> None:
+    lines = [line for which in PUBLIC for line in table()[which]]
+    refused = [line for line in lines if ": refused, " in line]
+    assert len(lines) >= 160
+    assert len(refused) <= (1.0 - READ_MIN) * len(lines), "\n".join(refused)
