@@ -161,6 +161,7 @@ def _link(link: LinkPart, joint: JointPart | None, index: Mapping[str, int]) -> 
     return replace(
         made,
         joint=joint.kind,
+        joint_name=joint.name,
         axis=joint.axis,
         limits=joint.limits,
         parent=index[joint.parent],
