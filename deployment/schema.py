@@ -22,6 +22,7 @@ from foosim.deployment.hosts import Host, Listen, Placed
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.rules import Network, Selector
 from foosim.deployment.network.traces import check_files, network_files
+from foosim.world.assembly.joint_selection import with_joint_names
 from foosim.world.scenery import mesh_files, read_contents
 from foosim.world.spec import WorldSpec
 
@@ -195,8 +196,6 @@ class Deployment(WorldSpec):
 
     def with_joint_names(self) -> Self:
         """The same with the names of joints in the settings that select some; the files of robots must be there."""
-        from foosim.world.assembly.joint_selection import with_joint_names  # brings numpy
-
         return with_joint_names(self)
 
     def files(self) -> dict[str, str | None]:

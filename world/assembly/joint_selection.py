@@ -12,7 +12,6 @@ from foosim.common.errors import Refused
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.entities import mounting_of
 from foosim.world.components.joint_names import joint_indices
-from foosim.world.components.mounted import body_at
 from foosim.world.components.view import called
 from foosim.world.layout import build_layout
 from foosim.world.scene import Body
@@ -30,6 +29,8 @@ def with_joint_names(spec: Spec) -> Spec:
     bare = {name: robot for name, robot in spec.robots.items() if _selecting(robot)}
     if not bare:
         return spec
+    from foosim.world.components.mounted import body_at  # brings numpy
+
     # The slots of these components follow from the joints, so the bodies are those of a world without them.
     without = {name: robot.model_copy(update=_without(robot)) for name, robot in bare.items()}
     world = spec.model_copy(update={"robots": {**spec.robots, **without}})
