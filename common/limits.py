@@ -5,7 +5,7 @@ A limit bounds the cost of a wrong or hostile peer, file or request. A refusal n
 
 from typing import Final
 
-PROTOCOL_VERSION: Final = 4
+PROTOCOL_VERSION: Final = 5
 """Version of the messages; a peer with another one is refused at the handshake, both versions named."""
 
 NAME_LENGTH_MAX: Final = 32
@@ -59,6 +59,10 @@ ASSETS_BYTES_MAX: Final = 64 * 1024 * 1024
 ASSET_PIECE_BYTES: Final = 1024 * 1024
 """The piece of such a file in one message."""
 MESH_TRIANGLES_MAX: Final = 200_000
+VISUAL_BYTES_MAX: Final = 64 * 1024 * 1024
+"""A file of a mesh that is only drawn: it becomes a small one before it is part of a deployment."""
+VISUAL_TRIANGLES_MAX: Final = 2_000_000
+"""A mesh that is only drawn, before it is made small."""
 SCENERY_TRIANGLES_MAX: Final = 400_000
 """All meshes of a world: they go to a viewer in one message, which fits one chunk of a capture."""
 

@@ -1,49 +1,89 @@
 """The files that a deployment refers to, pinned: they are read once, and their digests go into the deployment's text.
 
 Those of scenery, links and robots, and what a robot's file names in turn. They are in the deployment's asset folder,
-which is that of its own file, or the one inside it that `assets:` names.
+which is that of its own file, or the one inside it that `assets:` names; a mesh of a package may be elsewhere
+(`packages`). A visual mesh is read in drawn form only.
 """
 
 from __future__ import annotations
 
+import posixpath
 from collections.abc import Mapping
 from pathlib import Path
 
+from foosim.common import limits
 from foosim.deployment.loader import apply_sets, check_complete, load_deployment
 from foosim.deployment.network.traces import file_settings
-from foosim.deployment.text.files import read_files
+from foosim.deployment.packages import read_mesh_file
+from foosim.deployment.text.files import AbsentFile, read_files
+from foosim.world.bodies.findings import BadRobot
 from foosim.world.bodies.urdf import SUFFIX, Robot, meshes_of, place_of_mesh, read_urdf
+from foosim.world.bodies.urdf_links import MISSING
+from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content, undrawn_path
+from foosim.world.bodies.xml_tree import read_xml
 from foosim.world.matter.mesh import AssetError, digest_of
 from foosim.world.scenery import SceneryMesh
 
 
-def read_robot(file: Path, assets: Path | None) -> Robot:
-    """The robot in a URDF file, its meshes read from the asset folder: that of the file, if none is given.
+def asset_folder(file: Path) -> Path:
+    """The folder nearest to a URDF file in which all meshes are that it names by relative paths. Raises AssetError."""
+    meshes = read_xml(file.name, read_files(file.parent, ".", [file.name])[file.name]).below("mesh")
+    paths = [posixpath.normpath(mesh.attributes.get("filename", "")) for mesh in meshes]
+    up = max([path.split("/").count("..") for path in paths], default=0)
+    return [file.parent, *file.parent.resolve().parents][up] if up else file.parent
 
-    Raises AssetError.
+
+def read_robot(file: Path, assets: Path | None) -> Robot:
+    """The robot in a URDF file, its meshes read from the asset folder: `asset_folder`, if none is given.
+
+    Raises AssetError, for an invalid robot with all that is wrong, a line each.
     """
-    folder = file.parent if assets is None else assets
+    folder = asset_folder(file) if assets is None else assets
     try:
-        path = file.name if assets is None else file.resolve().relative_to(assets.resolve()).as_posix()
+        path = file.resolve().relative_to(folder.resolve()).as_posix()
     except ValueError:
         raise AssetError(f"{file}: not in the asset folder {assets}") from None
     files = read_files(folder, ".", [path])
-    for mesh in meshes_of(path, files[path]):
-        files |= _read(folder, ".", mesh, files)
-    return read_urdf(path, files)
+    absent = _read_meshes(folder, ".", path, files)
+    return _robot(path, files, absent)
 
 
-def _read(folder: Path, assets: str, path: str, known: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the content of one file by its path. Raises AssetError, for a mesh of a robot with the place in the
-    robot's file."""
+def _read_meshes(folder: Path, assets: str, robot: str, files: dict[str, bytes]) -> list[str]:
+    """Add the meshes that a robot's file names to `files`, and return why some of collisions are not there."""
+    absent = []
+    for mesh in meshes_of(robot, files[robot]):
+        if mesh in files:
+            continue
+        raw = undrawn_path(mesh)
+        most = limits.VISUAL_BYTES_MAX if raw else limits.ASSET_BYTES_MAX
+        try:
+            content = read_mesh_file(folder, assets, robot, files[robot], raw or mesh, most)
+        except AssetError as error:
+            if raw:
+                files[mesh] = undrawn_content(str(error))
+                continue
+            unread = f"{place_of_mesh(robot, files[robot], mesh)}: a mesh that cannot be read: {error}"
+            if not isinstance(error, AbsentFile):
+                raise AssetError(unread) from None
+            absent.append(unread)
+            continue
+        files[mesh] = drawn_content(raw, content) if raw else content
+        if sum(map(len, files.values())) > limits.ASSETS_BYTES_MAX:
+            raise AssetError(f"{mesh}: the files up to this one have more than {limits.ASSETS_BYTES_MAX} bytes")
+    return absent
+
+
+def _robot(path: str, files: Mapping[str, bytes], absent: list[str]) -> Robot:
+    """Return the robot in a file. Raises AssetError, with the meshes that are absent and where they were looked for."""
+    notes: tuple[str, ...] = ()
+    errors: list[str] = []
     try:
-        return read_files(folder, assets, [path], known)
-    except AssetError as error:
-        for robot, content in known.items():
-            if robot.endswith(SUFFIX) and path in meshes_of(robot, content):
-                place = place_of_mesh(robot, content, path)
-                raise AssetError(f"{place}: a mesh that cannot be read: {error}") from None
-        raise
+        robot = read_urdf(path, files)
+    except BadRobot as bad:
+        notes, errors = bad.notes, [line for line in str(bad).splitlines() if f": {MISSING}" not in line]
+    if errors or absent:
+        raise BadRobot([*errors, *absent], notes)
+    return robot
 
 
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:
@@ -56,7 +96,12 @@ def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes
     files: dict[str, bytes] = {}
     while wanted := deployment.wanted(files):
         for path in wanted:
-            files |= _read(folder, deployment.assets, path, files)
+            if path not in files:  # a mesh comes with its robot
+                files |= read_files(folder, deployment.assets, [path], files)
+            if path.endswith(SUFFIX):
+                absent = _read_meshes(folder, deployment.assets, path, files)
+                if absent:
+                    _robot(path, files, absent)
     if not files:
         return text, {}
     complete = deployment.with_assets(files)

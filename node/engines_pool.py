@@ -16,10 +16,11 @@ from foosim.node.core import NodeCore
 from foosim.node.physics.interface import AnyEngine
 from foosim.node.physics.making import make_engine
 from foosim.node.tick import Stepper, Work
-from foosim.world.assembly.world import initial_numbers
+from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.components.view import ComponentError
 from foosim.world.layout import Layout
 from foosim.world.matter.mesh import Mesh
+from foosim.world.scene import Hull
 
 FINGERPRINT_TICKS: Final = 32
 
@@ -34,6 +35,8 @@ class Solver:
         self._engine: AnyEngine | None = None
         self.fingerprint = b""
         """The digest of the fixed small run, empty before the engine is built, or a preset one."""
+        self.meshes = b""
+        """The digest of the meshes that were read and of the hulls around them."""
 
     # --- building ----------------------------------------------------------------------------------------------------
 
@@ -46,9 +49,11 @@ class Solver:
             engine = self._engine = self._make()
             if not self.fingerprint:
                 self.fingerprint = engine_fingerprint(engine, core.stepper)
+            self.meshes = self.meshes or blake2b(meshes_read(core.stepper), digest_size=32).digest()
         except ComponentError as error:
             core.fail(error)
         else:
+            core.member.meshes = self.meshes
             core.engine_ready(self.fingerprint)
 
     def rebuild(self) -> None:
@@ -86,7 +91,7 @@ class Solver:
 def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
     """Return the digest of a fixed small run: the excited world without its spares, 32 ticks.
 
-    The meshes of the scenery, as they were read here, are part of it, and the version of an engine that has one.
+    The meshes and hulls, as they were read here, are part of it, and the version of an engine that has one.
     """
     deployment: Deployment = stepper.deployment
     layout = stepper.layout
@@ -97,6 +102,14 @@ def engine_fingerprint(engine: AnyEngine, stepper: Stepper) -> bytes:
         work = Work(tick, layout, (bodies,), tuple(entity.index for entity in bodies), numbers, {})
         stepper.solve(engine, work)
     stepper.quarantined.clear()  # of no run
-    meshes = [shape.geometry.digest for shape in deployment.scenery_shapes() if isinstance(shape.geometry, Mesh)]
     version = getattr(engine, "version", "").encode()
-    return blake2b(np.array(numbers).tobytes() + b"".join(meshes) + version, digest_size=32).digest()
+    return blake2b(np.array(numbers).tobytes() + meshes_read(stepper) + version, digest_size=32).digest()
+
+
+def meshes_read(stepper: Stepper) -> bytes:
+    """Return the digests of the scenery's meshes, as they were read here, and of the hulls of bodies around theirs."""
+    scene = build_scene(stepper.deployment, stepper.layout)
+    links = [link for body in scene.bodies.values() for link in body.links]
+    shapes = [shape.geometry for shape in (*scene.scenery, *[shape for link in links for shape in link.shapes])]
+    found = [shape.mesh if isinstance(shape, Hull) else shape for shape in shapes if isinstance(shape, Hull | Mesh)]
+    return b"".join([mesh.digest for mesh in found])

@@ -87,6 +87,8 @@ class Member:
         self.is_ready = False
         self.simulation = b""
         """A node's digest of a fixed short run of its engine, once it has one."""
+        self.meshes = bytes(32)
+        """A node's digest of the meshes and hulls of its world, once it has one."""
         self._fingerprint = fingerprint
         self._world = world
         self._actions = actions
@@ -221,7 +223,8 @@ class Member:
             self._actions.append(self.standing())
         versions = foreign_versions(self.deployment) if self.role == "node" and self.deployment is not None else {}
         components = [ComponentVersion(name, version) for name, version in versions.items()]
-        ready = Ready(self.name, self.boot, self.layout.digest, self.simulation or self._fingerprint, components)
+        arithmetic = self.simulation or self._fingerprint
+        ready = Ready(self.name, self.boot, self.layout.digest, arithmetic, self.meshes, components)
         self._actions.append(Publish(channels.READY, self.name, encode(ready)))
 
     def entered(self) -> None:

@@ -200,6 +200,7 @@ class Ready(Message, frozen=True):
     """The process has built the layout with this digest; of the vHub, all declared lockstep clients have joined too.
 
     A node's `fingerprint` is the digest of a fixed short run of its engine: equal fingerprints compute equal worlds.
+    Its `meshes` are the digest of the meshes and hulls as it has read them, which depend on the versions of libraries.
     Its `components` are the versions of the components of the world from other packages.
     """
 
@@ -207,6 +208,7 @@ class Ready(Message, frozen=True):
     boot: Name
     layout: Digest
     fingerprint: Digest
+    meshes: Digest
     components: Annotated[list[ComponentVersion], Meta(max_length=limits.COMPONENTS_MAX)] = field(default_factory=list)
 
 

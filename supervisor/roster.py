@@ -64,7 +64,7 @@ class Roster:
         self.hub_account: dict[str, Any] = {}
         """The last report of a vHub with its state: a restarted one has none before it has read it."""
         self._fingerprint = fingerprint
-        self._simulation = b""
+        self._simulation = self._meshes = b""
 
     @property
     def expected(self) -> list[str]:
@@ -146,7 +146,14 @@ class Roster:
                 self.by_name.pop(process.name)
                 return differing
             if not self._simulation:
-                self._simulation = ready.fingerprint
+                self._simulation, self._meshes = ready.fingerprint, ready.meshes
+            if ready.meshes != self._meshes and not self.deployment.mixed_cpu:
+                self.by_name.pop(process.name)
+                return (
+                    f"it has read other meshes or hulls from the same files, with digest {ready.meshes.hex()[:16]}, the "
+                    f"first node's is {self._meshes.hex()[:16]}: install the same versions of numpy and pycollada on all "
+                    "machines (the deployment may say mixed_cpu: true)"
+                )
             if ready.fingerprint != self._simulation and not self.deployment.mixed_cpu:
                 self.by_name.pop(process.name)
                 return (

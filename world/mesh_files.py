@@ -1,8 +1,12 @@
-"""Meshes from outside: the text of an OBJ or the bytes of an STL file, checked, as vertices and triangles.
+"""Meshes from outside: the content of an OBJ, an STL or a COLLADA file, checked, as vertices and triangles.
 
 Everything that a physics engine takes for granted is checked here, in Python, before one sees it: a face with an
 unknown vertex ends the process that hands it to Bullet. An invalid mesh raises `AssetError` with file, line and
 reason. Materials and textures are not read, so no file names another one. Pure: the content is given.
+
+OBJ and STL are read here, where each fault has its line: trimesh 5.2 takes a corner that counts back from its face as
+one that counts back from the end of the file, passes over lines with a tab, and takes a time that grows with the square
+of the number of solids in a text. COLLADA is read by pycollada (matter/collada_file.py).
 
 OBJ: Wavefront's Advanced Visualizer manual, appendix B1. STL: 3D Systems' interface specification of 1989.
 """
@@ -10,18 +14,21 @@ OBJ: Wavefront's Advanced Visualizer manual, appendix B1. STL: 3D Systems' inter
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from functools import lru_cache
 from hashlib import blake2b
 from itertools import pairwise
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common import limits
 from foosim.common.errors import describe
-from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, Mesh
+from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, Mesh, mesh_format, too_many
+
+if TYPE_CHECKING:
+    from foosim.world.matter.mesh import Part
 
 EXTENT_MIN_M: Final = 1e-4
 EXTENT_MAX_M: Final = 1e3
@@ -39,15 +46,33 @@ _PASSED_OVER: Final = frozenset({"vn", "vt", "vp", "o", "g", "s", "l", "p", "use
 
 def read_mesh(name: str, content: bytes, scale: float = 1.0) -> Mesh:
     """Return the mesh in a file's content, its coordinates times `scale` in m; `name` is the file's in messages."""
-    suffix = name[name.rfind(".") :]
-    if suffix not in MESH_SUFFIXES:
-        raise AssetError(f"{name}: {describe('no format of a mesh', suffix)}, there are {', '.join(MESH_SUFFIXES)}")
     if len(content) > limits.ASSET_BYTES_MAX:
         raise AssetError(f"{name}: {len(content)} bytes, at most {limits.ASSET_BYTES_MAX} are allowed")
-    vertices, triangles = _READERS[suffix](name, content)
+    (vertices, triangles, _), *more = read_parts(name, content, limits.MESH_TRIANGLES_MAX)
+    for others, other_triangles, _ in more:
+        triangles = np.concatenate((triangles, other_triangles + np.int32(len(vertices))))
+        vertices = np.concatenate((vertices, others))
     with np.errstate(over="ignore"):  # an overflow is refused
         vertices = vertices * scale
     return _checked(name, vertices, triangles)
+
+
+def read_parts(name: str, content: bytes, triangles_max: int) -> list[Part]:
+    """Return the mesh in a file's content, not yet checked: a part for each use of a material, and at least one.
+
+    A unit of length that the file has is applied; another scale is not.
+    """
+    match mesh_format(name):
+        case ".obj":
+            return [(*_read_obj(name, content, triangles_max), None)]
+        case ".stl":
+            return [(*_read_stl(name, content, triangles_max), None)]
+        case ".dae":
+            from foosim.world.matter.collada_file import read_collada  # brings pycollada
+
+            return read_collada(name, content, triangles_max)
+    choices = ", ".join(MESH_SUFFIXES)
+    raise AssetError(f"{name}: {describe('no format of a mesh', name[name.rfind('.') :])}, there are {choices}")
 
 
 def pieces(mesh: Mesh, triangles_max: int) -> Iterator[Mesh]:
@@ -62,7 +87,7 @@ def pieces(mesh: Mesh, triangles_max: int) -> Iterator[Mesh]:
 @lru_cache(maxsize=CLOSED_KEPT)
 def is_closed(mesh: Mesh) -> bool:
     """True if it has an inside: each edge is one of an even number of triangles, by the places of its ends."""
-    corners = _merged(mesh.vertices[mesh.triangles].reshape(-1, 3))[1].astype(np.int64)
+    corners = merged(mesh.vertices[mesh.triangles].reshape(-1, 3))[1].astype(np.int64)
     edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)
     _, counts = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
     return bool((counts % 2 == 0).all())
@@ -94,10 +119,6 @@ def _compact(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> Mes
     triangles = np.ascontiguousarray(renumbered.reshape(-1, 3), dtype=np.int32)
     digest = blake2b(vertices.tobytes() + triangles.tobytes(), digest_size=32).digest()
     return Mesh(vertices, triangles, digest)
-
-
-def _too_many(place: str) -> AssetError:
-    return AssetError(f"{place}: more than {limits.MESH_TRIANGLES_MAX} triangles")
 
 
 def _text(name: str, content: bytes) -> Iterator[tuple[int, list[str]]]:
@@ -133,7 +154,7 @@ def _vertices(rows: list[tuple[float, float, float]]) -> NDArray[np.float64]:
 # --- OBJ -------------------------------------------------------------------------------------------------------------
 
 
-def _read_obj(name: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def _read_obj(name: str, content: bytes, triangles_max: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     vertices: list[tuple[float, float, float]] = []
     triangles: list[tuple[int, int, int]] = []
     faces: list[tuple[int, list[int]]] = []
@@ -147,8 +168,8 @@ def _read_obj(name: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[n
             corners = _corners(f"{name}:{line}", words, len(vertices))
             triangles += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
             faces.append((line, corners))
-            if len(triangles) > limits.MESH_TRIANGLES_MAX:
-                raise _too_many(f"{name}:{line}")
+            if len(triangles) > triangles_max:
+                raise too_many(f"{name}:{line}", triangles_max)
         elif key not in _PASSED_OVER:
             choices = ", ".join(["v", "f", *sorted(_PASSED_OVER)])
             raise AssetError(f"{name}:{line}: {describe('an unknown statement', key)}, there are {choices}")
@@ -175,28 +196,30 @@ def _corners(place: str, words: list[str], count: int) -> list[int]:
 # --- STL -------------------------------------------------------------------------------------------------------------
 
 
-def _read_stl(name: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def _read_stl(name: str, content: bytes, triangles_max: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Read either form: a binary file is one whose length fits its count, since its header may be `solid`, too."""
     if len(content) >= _STL_HEAD:
         count = int.from_bytes(content[_STL_HEAD - 4 : _STL_HEAD], "little")
         if len(content) == _STL_HEAD + count * _STL_TRIANGLE.itemsize:
-            return _read_binary(name, content, count)
+            return _read_binary(name, content, count, triangles_max)
         size = f"{count} triangles would take {_STL_HEAD + count * _STL_TRIANGLE.itemsize} bytes"
     else:
         size = f"a binary one has at least {_STL_HEAD} bytes"
     if content.lstrip()[:5] != b"solid" or b"\0" in content:
         raise AssetError(f"{name}: no STL file: it has {len(content)} bytes and {size}, a text one begins with solid")
-    return _merged(_vertices(list(_read_facets(name, content))))
+    return merged(_vertices(list(_read_facets(name, content, triangles_max))))
 
 
-def _read_binary(name: str, content: bytes, count: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    if count > limits.MESH_TRIANGLES_MAX:
-        raise _too_many(name)
+def _read_binary(
+    name: str, content: bytes, count: int, triangles_max: int
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    if count > triangles_max:
+        raise too_many(name, triangles_max)
     corners = np.frombuffer(content, _STL_TRIANGLE, offset=_STL_HEAD)["corners"].astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
     if len(bad):
         raise AssetError(f"{name}: triangle {bad[0] + 1} has a non-finite coordinate")
-    return _merged(corners.reshape(-1, 3))
+    return merged(corners.reshape(-1, 3))
 
 
 _FACET: Final = (
@@ -211,7 +234,7 @@ _FACET: Final = (
 """The first words of the lines of a facet."""
 
 
-def _read_facets(name: str, content: bytes) -> Iterator[tuple[float, float, float]]:
+def _read_facets(name: str, content: bytes, triangles_max: int) -> Iterator[tuple[float, float, float]]:
     """Yield the corners of each facet of a text."""
     step, count, line = -1, 0, 1
     for line, words in _text(name, content):
@@ -229,20 +252,14 @@ def _read_facets(name: str, content: bytes) -> Iterator[tuple[float, float, floa
             yield _numbers(f"{name}:{line}", words[1:])
         step = (step + 1) % len(_FACET)
         count += step == 0
-        if count > limits.MESH_TRIANGLES_MAX:
-            raise _too_many(f"{name}:{line}")
+        if count > triangles_max:
+            raise too_many(f"{name}:{line}", triangles_max)
     if step != -1:
         raise AssetError(f"{name}:{line}: the file ends within {'a facet' if step else 'the solid'}")
 
 
-def _merged(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def merged(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Return vertices and triangles of three corners each: corners equal to the last bit are one vertex."""
     rows = np.ascontiguousarray(corners + 0.0).view("V24").ravel()  # compared as bytes: five times as fast as by axis
     vertices, index = np.unique(rows, return_inverse=True)
     return vertices.view(np.float64).reshape(-1, 3), index.reshape(-1, 3).astype(np.int32)
-
-
-_READERS: Final[Mapping[str, Callable[[str, bytes], tuple[NDArray[np.float64], NDArray[np.int32]]]]] = {
-    ".obj": _read_obj,
-    ".stl": _read_stl,
-}

@@ -19,7 +19,7 @@ from foosim.common.errors import BadValue
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.matter.materials import UNKNOWN, Radio
-from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, Mesh, check_digest, digest_of
+from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, Mesh, check_digest, digest_of, mesh_format
 from foosim.world.scene import Box, Colour, Cylinder, Quaternion, Shape, Vector, from_rpy
 
 PATH_LENGTH_MAX: Final = 200
@@ -60,7 +60,7 @@ def _asset_path(path: str) -> str:
 
 def _mesh_path(path: str) -> str:
     _asset_path(path)
-    if path[path.rfind(".") :] not in MESH_SUFFIXES:
+    if not mesh_format(path):
         raise custom_error(BadValue(f"no format of a mesh, there are {', '.join(MESH_SUFFIXES)}", path))
     return path
 

@@ -67,6 +67,10 @@ def read_deployment_text(path: Path) -> str:
         raise DeploymentError([str(unreadable.problem)]) from None
 
 
+class AbsentFile(AssetError):
+    """A file is not where it was looked for."""
+
+
 class _Unreadable(Exception):
     """A file's bytes are no text of a deployment."""
 
@@ -89,11 +93,16 @@ def _decoded(raw: bytes, file: str, rank: int) -> str:
 
 
 def read_files(
-    folder: Path, assets: str, wanted: Iterable[str], known: Mapping[str, bytes] = NO_FILES
+    folder: Path,
+    assets: str,
+    wanted: Iterable[str],
+    known: Mapping[str, bytes] = NO_FILES,
+    bytes_max: int | None = None,
 ) -> dict[str, bytes]:
     """The contents of files by their paths inside the asset folder `assets` of a folder; raises AssetError.
 
-    `known` are the files that were read before: the limit is one of all together.
+    `known` are the files that were read before: the limit is one of all together. A file has at most `bytes_max`, else
+    the limit of assets. One that does not exist is an AbsentFile.
     """
     files: dict[str, bytes] = {}
     where = (folder / assets).absolute()
@@ -104,7 +113,8 @@ def read_files(
         raise AssetError(f"{folder}: {error.strerror}") from None
     try:
         for path in wanted:
-            files[path] = _read_file(root, "" if assets == "." else f"{assets}/", path, where)
+            prefix = "" if assets == "." else f"{assets}/"
+            files[path] = _read_file(root, prefix, path, where, bytes_max or limits.ASSET_BYTES_MAX)
             left -= len(files[path])
             if left < 0:
                 raise AssetError(f"{path}: the files up to this one have more than {limits.ASSETS_BYTES_MAX} bytes")
@@ -113,7 +123,7 @@ def read_files(
     return files
 
 
-def _read_file(root: int, prefix: str, path: str, where: Path) -> bytes:
+def _read_file(root: int, prefix: str, path: str, where: Path, bytes_max: int) -> bytes:
     """The content of a file below an open folder; `where` is the asset folder in messages."""
     problem = path_problem(path)
     if problem:
@@ -127,30 +137,30 @@ def _read_file(root: int, prefix: str, path: str, where: Path) -> bytes:
             opened.append(inner)
         file = os.open(last, _FILE, dir_fd=inner)
         opened.append(file)
-        return _content(file, path)
+        return _content(file, path, bytes_max)
+    except FileNotFoundError as error:
+        raise AbsentFile(f"{path}: {error.strerror} in {where}") from None
     except OSError as error:
-        raise AssetError(f"{path}: {_reason(error, where)}") from None
+        raise AssetError(f"{path}: {_reason(error)}") from None
     finally:
         for descriptor in opened:
             with suppress(OSError):
                 os.close(descriptor)
 
 
-def _reason(error: OSError, where: Path) -> str:
-    """The error of a component that was not opened, below the folder `where`. A link is neither a folder nor a file."""
-    if error.errno == errno.ENOENT:
-        return f"{error.strerror} in {where}"
+def _reason(error: OSError) -> str:
+    """The error of a component that was not opened. A link is neither a folder nor a file."""
     if error.errno in (errno.ELOOP, errno.ENOTDIR):
         return "a symbolic link, or no folder, on the way; neither is followed"
     return error.strerror or str(error)
 
 
-def _content(file: int, path: str) -> bytes:
+def _content(file: int, path: str, bytes_max: int) -> bytes:
     if not stat.S_ISREG(os.fstat(file).st_mode):
         raise AssetError(f"{path}: no regular file")
     content = bytearray()
-    while chunk := os.read(file, min(limits.ASSET_BYTES_MAX + 1 - len(content), 1 << 20)):
+    while chunk := os.read(file, min(bytes_max + 1 - len(content), 1 << 20)):
         content += chunk
-        if len(content) > limits.ASSET_BYTES_MAX:
-            raise AssetError(f"{path}: more than {limits.ASSET_BYTES_MAX} bytes")
+        if len(content) > bytes_max:
+            raise AssetError(f"{path}: more than {bytes_max} bytes")
     return bytes(content)

@@ -216,7 +216,7 @@ def lies_to_the_supervisor(system: System) -> list[Lie]:
         (channels.HELLO, NOBODY, replace(hello, name=NOBODY)),
         (channels.HELLO, "n1", replace(hello, role="dragon", boot="boot")),
         (channels.FETCH, "n1", Fetch("n1", "boot-1", bytes(32), 0)),
-        (channels.READY, "n1", Ready("n1", "other", bytes(32), bytes(32))),
+        (channels.READY, "n1", Ready("n1", "other", bytes(32), bytes(32), bytes(32))),
         (
             channels.RESUME_STATE,
             VHUB,

@@ -80,8 +80,8 @@ def test_a_deployment_may_allow_mixed_processors() -> None:
     assert roster.reason_against(msgspec.structs.replace(HELLO, fingerprint=OTHER)) == ""
     one = roster.take(HELLO, 0)
     other = roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
-    assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT), LAYOUT) == ""
-    assert roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER), LAYOUT) == ""
+    assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT, bytes(32)), LAYOUT) == ""
+    assert roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER, bytes(32)), LAYOUT) == ""
     assert roster.arithmetic == b"", "there are several"
 
 
@@ -101,9 +101,9 @@ def test_nodes_with_another_version_of_a_form_are_refused(
         roster = Roster(deployment, PRINT)
         one, other = roster.take(HELLO, 0), roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
         same = [ComponentVersion(name, version) for name, version in here.items()]
-        assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT, same), LAYOUT) == ""
+        assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT, bytes(32), same), LAYOUT) == ""
         others = [ComponentVersion(name, version) for name, version in there.items()]
-        reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, PRINT, others), LAYOUT)
+        reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, PRINT, bytes(32), others), LAYOUT)
         assert reason == f"sensor own:Gauge {why}: install the same on all machines"
         assert "blue" not in roster.by_name and "red" in roster.by_name
 
@@ -112,8 +112,8 @@ def test_engines_whose_small_run_differs_are_refused() -> None:
     roster = Roster(DEPLOYMENT, PRINT)
     one = roster.take(HELLO, 0)
     other = roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
-    assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT), LAYOUT) == ""
-    reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER), LAYOUT)
+    assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT, bytes(32)), LAYOUT) == ""
+    reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER, bytes(32)), LAYOUT)
     assert reason.startswith(
         "a fixed small run of its engine has digest 0000000000000000, the first node's is 00010203"
     )
@@ -121,18 +121,30 @@ def test_engines_whose_small_run_differs_are_refused() -> None:
     assert roster.arithmetic == PRINT
 
 
+def test_nodes_that_read_other_meshes_are_refused() -> None:
+    roster = Roster(DEPLOYMENT, PRINT)
+    one = roster.take(HELLO, 0)
+    other = roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
+    assert roster.note_ready(one, Ready("red", "boot-1", LAYOUT, PRINT, PRINT), LAYOUT) == ""
+    reason = roster.note_ready(other, Ready("blue", "boot-1", LAYOUT, OTHER, OTHER), LAYOUT)
+    assert reason.startswith(
+        "it has read other meshes or hulls from the same files, with digest 0000000000000000, the first node's is 00010203"
+    )
+    assert "blue" not in roster.by_name and "red" in roster.by_name
+
+
 def test_the_vhub_has_no_engine_to_compare() -> None:
     roster = Roster(DEPLOYMENT, PRINT)
     hub = roster.take(Hello("vhub", "vhub", "b", limits.PROTOCOL_VERSION, "table", PRINT), 0)
     assert roster.arithmetic == b"", "no node is here"
-    roster.note_ready(roster.take(HELLO, 0), Ready("red", "boot-1", LAYOUT, PRINT), LAYOUT)
-    assert roster.note_ready(hub, Ready("vhub", "b", LAYOUT, OTHER), LAYOUT) == ""
+    roster.note_ready(roster.take(HELLO, 0), Ready("red", "boot-1", LAYOUT, PRINT, bytes(32)), LAYOUT)
+    assert roster.note_ready(hub, Ready("vhub", "b", LAYOUT, OTHER, bytes(32)), LAYOUT) == ""
     assert roster.arithmetic == PRINT
 
 
 def test_who_has_built_another_layout_cannot_take_part() -> None:
     roster = Roster(DEPLOYMENT, PRINT)
-    reason = roster.note_ready(roster.take(HELLO, 0), Ready("red", "boot-1", bytes(32), PRINT), LAYOUT)
+    reason = roster.note_ready(roster.take(HELLO, 0), Ready("red", "boot-1", bytes(32), PRINT, bytes(32)), LAYOUT)
     assert reason.startswith("its world has another layout than the supervisor's: install the same version on all")
     assert "red" in roster.missing() and "red" not in roster.by_name
 
@@ -187,7 +199,7 @@ def test_the_last_node_that_was_lost_goes_on_when_it_is_heard_of_again(case: str
     process = core.state.roster.take(HELLO, 0)
     if case != "not built":
         layout = core.state.frame.layout.digest
-        core.state.roster.note_ready(process, Ready("red", HELLO.boot, layout, PRINT), layout)
+        core.state.roster.note_ready(process, Ready("red", HELLO.boot, layout, PRINT, bytes(32)), layout)
     core.state.roster.take(msgspec.structs.replace(HELLO, name="blue"), 0)
     core.open_epoch(core.state.owners, 0, ["blue", "red"])
     core.node_loss.lose("red", "silent", 0)

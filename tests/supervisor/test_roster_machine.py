@@ -108,7 +108,7 @@ class Membership(RuleBasedStateMachine):
     @initialize(everybody=st.sampled_from((True, True, False)))
     def the_hub_is_here(self, everybody: bool) -> None:
         self.tell(channels.HELLO, VHUB, Hello("vhub", VHUB, "b0", limits.PROTOCOL_VERSION, "", PRINT))
-        self.tell(channels.READY, VHUB, Ready(VHUB, "b0", self.core.state.frame.layout.digest, PRINT))
+        self.tell(channels.READY, VHUB, Ready(VHUB, "b0", self.core.state.frame.layout.digest, PRINT, bytes(32)))
         for node in NODES if everybody else ():
             self.come(node)
 
@@ -130,7 +130,7 @@ class Membership(RuleBasedStateMachine):
     @rule(node=st.sampled_from(NODES), of_another=st.booleans())
     def ready(self, node: str, of_another: bool) -> None:
         boot = "other" if of_another else f"b{self.boots[node]}"
-        self.tell(channels.READY, node, Ready(node, boot, self.core.state.frame.layout.digest, PRINT))
+        self.tell(channels.READY, node, Ready(node, boot, self.core.state.frame.layout.digest, PRINT, bytes(32)))
         if of_another or self.state[node] not in (KNOWN, MEMBER):
             return
         self.built[node] = True

@@ -8,11 +8,12 @@ axes); the moments of primitives and of tetrahedra are those of any handbook of 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from math import sqrt
+from collections.abc import Iterable, Sequence
+from math import fsum, pi, sqrt
 from typing import Final, NamedTuple
 
 from foosim.common.errors import BadValue
+from foosim.common.exact_math import exp, log
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import (
     ORIGIN,
@@ -23,6 +24,7 @@ from foosim.world.scene import (
     Geometry,
     Hull,
     Quaternion,
+    Shape,
     Sphere,
     Vector,
     rotate,
@@ -40,6 +42,7 @@ TRIANGLE_SHARE: Final = 0.01
 """The share by which a moment may exceed the sum of both others: files round their numbers."""
 SWEEPS_MAX: Final = 32
 """Sweeps converge quadratically: six are enough for any tensor of float64."""
+WATER_KG_M3: Final = 1000.0
 NO_TENSOR: Final[Tensor] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -193,11 +196,12 @@ def combined(parts: Iterable[MassOf]) -> MassOf:
     return MassOf(mass, centre, total)
 
 
-def check_mass(mass: float) -> None:
-    """Raise BadValue for an invalid mass of a robot's body."""
+def check_mass(mass: float) -> float:
+    """Return a valid mass of a robot's body. Raises BadValue."""
     if not MASS_MIN_KG <= mass <= MASS_MAX_KG:
         valid = f"valid are {MASS_MIN_KG:g} to {MASS_MAX_KG:g} kg"
         raise BadValue(f"a mass of {mass:g} kg, {valid}; a link without a mass has no inertial")
+    return mass
 
 
 def check_moments(mass: float, moments: Vector) -> None:
@@ -231,6 +235,48 @@ def solid(geometry: Geometry, mass: float) -> MassOf:
     return MassOf(mass, ORIGIN, (x, 0.0, 0.0, y, 0.0, z))
 
 
+def ball_moments(mass: float) -> Vector:
+    """Return the moments of a solid ball of the density of water."""
+    volume = mass / WATER_KG_M3
+    radius = exp(log(volume * 3.0 / (4.0 * pi)) / 3.0)
+    moment = 0.4 * mass * radius * radius
+    return moment, moment, moment
+
+
+def solid_of(shapes: Sequence[Shape], mass: float) -> MassOf:
+    """Return the mass of a body whose shapes are all filled at one density, in the frame of its link."""
+    volumes = [_volume(shape.geometry) for shape in shapes]
+    whole = fsum(volumes)
+    return combined(
+        [
+            placed(solid(shape.geometry, mass * volume / whole), shape.position, shape.orientation)
+            for shape, volume in zip(shapes, volumes, strict=True)
+        ]
+    )
+
+
+def _volume(geometry: Geometry) -> float:
+    if isinstance(geometry, Box):
+        x, y, z = geometry.half
+        return 8.0 * x * y * z
+    if isinstance(geometry, Hull):
+        return _mesh_volume(geometry.mesh)
+    assert not isinstance(geometry, Mesh), "a mesh need not have an inside"
+    r2, ball = geometry.radius * geometry.radius, 0.0 if isinstance(geometry, Cylinder) else 4.0 / 3.0 * geometry.radius
+    return pi * r2 * (ball if isinstance(geometry, Sphere) else ball + geometry.length)
+
+
+def _mesh_volume(mesh: Mesh) -> float:
+    vertices = mesh.vertices.tolist()
+    corners = [[vertices[corner] for corner in triangle] for triangle in mesh.triangles.tolist()]
+    return fsum([_six_volumes(a, b, c) for a, b, c in corners]) / 6.0
+
+
+def _six_volumes(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
+    """Return six times the signed volume of the tetrahedron of the origin and three points."""
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+
+
 def _solid_moments(geometry: Box | Sphere | Cylinder | Capsule, mass: float) -> Vector:
     if isinstance(geometry, Box):
         x, y, z = geometry.half
@@ -261,9 +307,7 @@ def _solid_mesh(mesh: Mesh, mass: float) -> MassOf:
     vertices = mesh.vertices.tolist()
     for corners in mesh.triangles.tolist():
         a, b, c = (vertices[corner] for corner in corners)
-        six = (
-            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-        )
+        six = _six_volumes(a, b, c)
         total = [a[axis] + b[axis] + c[axis] for axis in range(3)]
         volume += six / 6.0
         for axis in range(3):

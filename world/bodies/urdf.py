@@ -1,8 +1,8 @@
-"""A robot from a URDF file: a tree of links with masses, joints and convex shapes, as data of a body.
+"""A robot from a URDF file: a tree of links with masses, joints, convex shapes and looks, as data of a body.
 
-Unsupported parts are refused with file, line and the valid choices: mimic joints, loops, planar and floating joints,
-plugins, impossible masses and inertias. Parts that do not concern the body are passed over and noted. Visual geometry
-is not read: a robot is drawn by its collision shapes. Pure: the contents of files are given.
+A file is read as it is, as far as its robot can be computed. What would be another robot is an error: loops, planar and
+floating joints, masses below 0. What does not concern the body is passed over, and what has one plain meaning is
+mended; both are noted. All errors of a file are reported at once. Pure: the contents of files are given.
 
 Source of the format: the XML specification of URDF at wiki.ros.org/urdf/XML; `capsule` is an extension that Bullet and
 newer tools of ROS share.
@@ -10,28 +10,33 @@ newer tools of ROS share.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
+from foosim.world.bodies.findings import Findings
 from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of
-from foosim.world.bodies.urdf_joints import JointPart, in_tree, read_joint
-from foosim.world.bodies.urdf_links import LinkPart, materials_of, mesh_paths, read_link
-from foosim.world.bodies.xml_tree import Element, read_xml
-from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Quaternion, Shape, Vector, multiply, rotate
+from foosim.world.bodies.urdf_joints import Following, JointPart, Tree, followers_of, in_tree, read_joint
+from foosim.world.bodies.urdf_links import LinkPart, mesh_path, meshes_in, read_link
+from foosim.world.bodies.urdf_masses import with_masses
+from foosim.world.bodies.urdf_visuals import first_colour, materials_of, read_visuals
+from foosim.world.bodies.xml_tree import BadElement, Element, read_xml
+from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Mimic, Quaternion, Shape, Vector, multiply, rotate
 
 SUFFIX: Final = ".urdf"
 SHAPES_MAX: Final = 256
+"""Of collision: pairs of shapes that may touch are listed, and their count grows with its square."""
 KEPT: Final = 32
 """The count of files whose robots are kept."""
 NOTED: Final = {
     "transmission": "actuators are the deployment's",
     "gazebo": "it is for another simulator",
+    "plugin": "sensors, actuators and rules are the deployment's",
+    "ros2_control": "actuators are the deployment's",
     "safety_controller": "limits are the joint's",
     "calibration": "joints are where they are",
     "sensor": "sensors are the deployment's",
-    "visual": "a robot is drawn by its collision shapes, in the colour of the first visual",
     "self_collision_checking": "contacts are the engine's",
     "contact": "surfaces are the deployment's",
     "friction": "joints have damping alone",
@@ -40,29 +45,34 @@ NOTED: Final = {
 """Elements that are passed over, and the reasons."""
 KNOWN: Final = {
     "robot": ("link", "joint", "material"),
-    "link": ("inertial", "collision"),
+    "link": ("inertial", "collision", "visual"),
     "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
 }
+REFUSED: Final = ("loop_joint", "model", "include", "deformable")
+"""Elements without which this would be another robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
     """A robot as its file describes it. `links` are in their tree's order, from the root, which has a fixed joint.
 
-    `joints` are the names of the joints, one for each link; the root's is empty. `notes` name the elements passed over.
+    `notes` are what a person should know of the file: passed over, mended, without effect.
     """
 
     name: str
     file: str
     links: tuple[Link, ...]
-    joints: tuple[str, ...]
     notes: tuple[str, ...]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names of the joints, one for each link; the root's is empty."""
+        return tuple([link.joint_name for link in self.links])
 
     @property
     def moving(self) -> tuple[str, ...]:
         """The names of the joints that move, in the order of their numbers."""
-        pairs = zip(self.links, self.joints, strict=True)
-        return tuple([joint for link, joint in pairs if link.joint in MOVING])
+        return tuple([link.joint_name for link in self.links if link.joint in MOVING])
 
     @property
     def mass(self) -> float:
@@ -72,92 +82,159 @@ class Robot:
 
 @lru_cache(maxsize=KEPT)
 def meshes_of(path: str, content: bytes) -> tuple[str, ...]:
-    """Return the files of the meshes that a URDF file names, inside the asset folder. Raises AssetError."""
-    return tuple(mesh_paths(_robot_of(path, content)))
+    """Return the files of the meshes that a URDF file names, in the asset folder: of collisions, and `drawn_path` of
+    those of visuals. A mesh with an invalid path is left out. Raises AssetError."""
+    return tuple(_mesh_elements(path, content))
 
 
 def place_of_mesh(path: str, content: bytes, mesh: str) -> str:
     """Return the `file:line` at which a URDF file names a mesh first."""
-    return mesh_paths(_robot_of(path, content))[mesh].place
+    return _mesh_elements(path, content)[mesh].place
+
+
+def _mesh_elements(path: str, content: bytes) -> dict[str, Element]:
+    robot, found = _robot_of(path, content), {}
+    for part, path_of in (("collision", mesh_path), ("visual", _drawn_mesh)):
+        for mesh in meshes_in(robot, part):
+            try:
+                found.setdefault(path_of(mesh), mesh)
+            except BadElement:  # an error, or a note, where it is read
+                continue
+    return found
+
+
+def _drawn_mesh(mesh: Element) -> str:
+    from foosim.world.bodies.visual_meshes import drawn_path
+
+    return drawn_path(mesh_path(mesh))
 
 
 def read_urdf(path: str, files: Mapping[str, bytes]) -> Robot:
-    """Return the robot in the URDF file of this path; its meshes are in `files`, too. Raises AssetError."""
+    """Return the robot in the URDF file of this path; its meshes are in `files`, too.
+
+    Raises AssetError; where the file can be read as XML it is a BadRobot with all errors.
+    """
     meshes = tuple([(mesh, files[mesh]) for mesh in meshes_of(path, files[path]) if mesh in files])
     return _read(path, files[path], meshes)
 
 
 @lru_cache(maxsize=KEPT)
 def _read(path: str, content: bytes, meshes: tuple[tuple[str, bytes], ...]) -> Robot:
-    robot = _robot_of(path, content)
-    _check_refused(robot)
-    links = _links(robot, dict(meshes))
-    names = {link.name for link in links}
-    joints: list[JointPart] = []
-    for element in robot.all_of("joint"):
-        joint = read_joint(element, names)
-        other = next((one for one in joints if one.name == joint.name), None)
-        if other is not None:
-            raise element.error(f"a joint with the name of that of line {other.line}", joint.name)
-        joints.append(joint)
-    tree = in_tree(path, links, joints)
+    robot, findings = _robot_of(path, content), Findings()
+    _note_passed_over(robot, findings)
+    for element in robot.all_of(*REFUSED):
+        findings.error(element, "not a part of URDF that makes a tree of links", element.tag)
+    links = _links(robot, dict(meshes), findings)
+    joints = _joints(robot, [link.name for link in links], findings)
+    tree, following = _tree(links, joints, findings)
+    notes = findings.notes()
     index = {link.name: number for number, (link, _) in enumerate(tree)}
-    made = tuple([_link(link, joint, index) for link, joint in tree])
-    named = tuple(["" if joint is None else joint.name for _, joint in tree])
-    return Robot(robot.attributes.get("name", ""), path, made, named, tuple(_notes(robot)))
+    at = {joint.name: number for number, (_, joint) in enumerate(tree) if joint is not None}
+    made = tuple([_link(link, joint, index, at, following) for link, joint in tree])
+    return Robot(robot.attributes.get("name", ""), path, made, notes)
 
 
 def _robot_of(path: str, content: bytes) -> Element:
     robot = read_xml(path, content)
-    if any(key.startswith("xmlns:xacro") for key in robot.attributes) and [*_macros(robot)]:
-        raise next(_macros(robot)).error("an unexpanded file of xacro: write the output of `xacro FILE`")
+    macro = next(_macros(robot), None)
+    if macro is not None or path.endswith(".xacro"):
+        name = path.rpartition("/")[2]
+        out = name.removesuffix(".xacro").removesuffix(SUFFIX) + SUFFIX
+        expand = f"xacro {name} > {out if out != name else 'robot' + SUFFIX}"
+        raise (macro or robot).error(f"a file of xacro, which makes a URDF file of it: {expand}")
     if robot.tag != "robot":
         raise robot.error("no URDF: the outermost element is robot", robot.tag)
     return robot
 
 
-def _macros(element: Element) -> Iterator[Element]:
-    for child in element.children:
-        if child.tag.startswith("xacro:") or any("${" in value for value in child.attributes.values()):
+def _macros(robot: Element) -> Iterator[Element]:
+    """Yield what is xacro's in a robot: its elements, and what it computes in a part that is read."""
+    for child in robot.children:
+        if child.tag.startswith("xacro:"):
             yield child
-        yield from _macros(child)
+        elif child.tag in KNOWN["robot"]:
+            yield from _computed(child)
 
 
-def _check_refused(robot: Element) -> None:
-    """Refuse elements by name without which this would be another robot."""
-    for element in robot.below("plugin"):
-        name = element.attributes.get("filename") or element.attributes.get("name", "")
-        what = "an unsupported plugin: sensors, actuators and rules are the deployment's; remove it here"
-        raise element.error(what, name)
-    for element in robot.all_of("loop_joint", "model", "include"):
-        raise element.error("not a part of URDF that makes a tree of links", element.tag)
+def _computed(element: Element) -> Iterator[Element]:
+    texts = element.attributes.values()
+    if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in texts):
+        yield element
+    for child in element.children:
+        yield from _computed(child)
 
 
-def _links(robot: Element, files: Mapping[str, bytes]) -> list[LinkPart]:
-    colours = materials_of(robot)
+def _links(robot: Element, files: Mapping[str, bytes], findings: Findings) -> list[LinkPart]:
+    colours = materials_of(robot, findings)
     links: dict[str, LinkPart] = {}
     shapes = 0
     for element in robot.all_of("link"):
-        link = read_link(element, colours, files)
+        link = read_link(element, first_colour(element, colours), files, findings)
+        looks = tuple(read_visuals(element, colours, files, findings))
+        before, shapes = shapes, shapes + sum(1 for _ in element.all_of("collision"))
+        if before <= SHAPES_MAX < shapes:
+            findings.error(element, f"more than {SHAPES_MAX} collision shapes")
+        if link is None:
+            continue
         if link.name in links:
-            raise element.error(f"a link with the name of that of line {links[link.name].line}", link.name)
-        links[link.name] = link
-        shapes += len(link.shapes)
-        if shapes > SHAPES_MAX:
-            raise element.error(f"more than {SHAPES_MAX} collision shapes")
-    if not links:
-        raise robot.error("a robot without links")
-    if shapes == 0:
-        raise robot.error("a robot without a collision shape: nothing would touch it, nor see it")
+            line = links[link.name].element.line
+            findings.error(element, f"a link with the name of that of line {line}", link.name)
+            continue
+        links[link.name] = replace(link, visuals=looks)
+    if not robot.children or not any(robot.all_of("link")):
+        findings.error(robot, "a robot without links")
+    elif shapes == 0:
+        findings.error(robot, "a robot without a collision shape: nothing would touch it, nor see it")
     return [*links.values()]
 
 
-def _link(link: LinkPart, joint: JointPart | None, index: Mapping[str, int]) -> Link:
+def _joints(robot: Element, links: Sequence[str], findings: Findings) -> list[JointPart] | None:
+    """Return the joints; None where one has no valid name or ends, without which the tree is unknown."""
+    joints: dict[str, JointPart] = {}
+    complete = True
+    for element in robot.all_of("joint"):
+        joint = read_joint(element, links, findings)
+        if joint is None:
+            complete = False
+        elif joint.name in joints:
+            line = joints[joint.name].element.line
+            findings.error(element, f"a joint with the name of that of line {line}", joint.name)
+            complete = False
+        else:
+            joints[joint.name] = joint
+    return [*joints.values()] if complete else None
+
+
+def _tree(
+    links: Sequence[LinkPart], joints: Sequence[JointPart] | None, findings: Findings
+) -> tuple[Tree, Mapping[str, Following]]:
+    if not links or joints is None:
+        return [], {}
+    made, following = followers_of(joints, findings)
+    tree: Tree = findings.read([], in_tree, links, made)
+    return with_masses(tree, findings), following
+
+
+def _link(
+    link: LinkPart,
+    joint: JointPart | None,
+    index: Mapping[str, int],
+    at: Mapping[str, int],
+    following: Mapping[str, Following],
+) -> Link:
     made = Link(
-        link.name, "fixed", link.shapes, link.mass.mass, link.moments, link.mass.centre, principal=link.principal
+        link.name,
+        "fixed",
+        link.shapes,
+        link.mass.mass,
+        link.moments,
+        link.mass.centre,
+        principal=link.principal,
+        visuals=link.visuals,
     )
     if joint is None:
         return made
+    its = following.get(joint.name)
     return replace(
         made,
         joint=joint.kind,
@@ -170,26 +247,27 @@ def _link(link: LinkPart, joint: JointPart | None, index: Mapping[str, int]) -> 
         effort=joint.effort,
         speed=joint.speed,
         damping=joint.damping,
+        joint_name=joint.name,
+        mimic=None if its is None else Mimic(at[its.leader], its.ratio, its.offset),
     )
 
 
-def _notes(robot: Element) -> Iterator[str]:
-    """Yield the elements that were passed over, each once, with its lines."""
-    lines: dict[str, list[int]] = {}
-    passed = [(child, robot) for child in robot.children if child.tag not in KNOWN["robot"]]
+def _note_passed_over(robot: Element, findings: Findings) -> None:
+    """Note the elements that are passed over."""
+    passed = [child for child in robot.children if child.tag not in (*KNOWN["robot"], *REFUSED)]
     for part in robot.all_of("link", "joint"):
-        passed += [(child, part) for child in part.children if child.tag not in KNOWN[part.tag]]
+        passed += [child for child in part.children if child.tag not in KNOWN[part.tag]]
         for dynamics in part.all_of("dynamics"):
             if dynamics.attributes.get("friction", "0").strip("0.") != "":
-                lines.setdefault("friction", []).append(dynamics.line)
-    for texture in robot.below("texture"):
-        lines.setdefault("texture", []).append(texture.line)
-    for element, _ in passed:
-        lines.setdefault(element.tag, []).append(element.line)
-    for tag, where in sorted(lines.items()):
-        shown = ", ".join(map(str, where[:8])) + (", ..." if len(where) > 8 else "")
-        why = NOTED.get(tag, "it is not part of a body")
-        yield f"{tag} ({'line' if len(where) == 1 else 'lines'} {shown}): {why}"
+                _note_passed(dynamics, "friction", findings)
+    for element in (*passed, *robot.below("texture")):
+        _note_passed(element, element.tag, findings)
+    for plugin in (plugin for element in passed for plugin in element.below("plugin")):
+        _note_passed(plugin, "plugin", findings)
+
+
+def _note_passed(element: Element, tag: str, findings: Findings) -> None:
+    findings.note(element, f"passed over: {tag}", NOTED.get(tag, "it is not part of a body"))
 
 
 # --- the body --------------------------------------------------------------------------------------------------------
@@ -239,16 +317,25 @@ def _with(shapes: tuple[Shape, ...], surface: str) -> tuple[Shape, ...]:
     return tuple([replace(shape, surface=surface) for shape in shapes])
 
 
+def poses_of(links: Sequence[Link]) -> list[tuple[Vector, Quaternion]]:
+    """Return the poses of links in the frame of the first one, all joints at 0."""
+    poses: list[tuple[Vector, Quaternion]] = [(ORIGIN, UPRIGHT)]
+    for link in links[1:]:
+        position, orientation = poses[link.parent]
+        x, y, z = rotate(orientation, link.position)
+        place = position[0] + x, position[1] + y, position[2] + z
+        poses.append((place, multiply(orientation, link.orientation)))
+    return poses
+
+
 def _base(robot: Robot) -> dict[int, tuple[Vector, Quaternion]]:
     """Return the poses, in the first link's frame, of the links that are fixed to it, and its own."""
-    poses: dict[int, tuple[Vector, Quaternion]] = {0: (ORIGIN, UPRIGHT)}
+    held = {0}
     for number, link in enumerate(robot.links[1:], 1):
-        if link.joint == "fixed" and link.parent in poses:
-            position, orientation = poses[link.parent]
-            x, y, z = rotate(orientation, link.position)
-            place = position[0] + x, position[1] + y, position[2] + z
-            poses[number] = place, multiply(orientation, link.orientation)
-    return poses
+        if link.joint == "fixed" and link.parent in held:
+            held.add(number)
+    poses = poses_of(robot.links)
+    return {number: poses[number] for number in sorted(held)}
 
 
 def _base_mass(robot: Robot) -> MassOf:

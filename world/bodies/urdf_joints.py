@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 from typing import Final
 
 from foosim.common.errors import describe
 from foosim.common.names import nearest_name
+from foosim.world.bodies.findings import Findings
 from foosim.world.bodies.urdf_links import LinkPart
 from foosim.world.bodies.urdf_values import (
     ANGLE_MAX_RAD,
     EXTENT_MAX_M,
     NUMBER_MAX,
+    UNMOVED,
     Placed,
     name_of,
     number_of,
@@ -22,8 +24,7 @@ from foosim.world.bodies.urdf_values import (
     vector_of,
 )
 from foosim.world.bodies.xml_tree import Element
-from foosim.world.matter.mesh import AssetError
-from foosim.world.scene import MOVING, ORIGIN, JointKind, Vector
+from foosim.world.scene import MOVING, ORIGIN, JointKind, Vector, moved, multiply, rotate, turn
 
 X_AXIS: Final[Vector] = (1.0, 0.0, 0.0)
 AXIS_MIN: Final = 1e-6
@@ -42,10 +43,14 @@ REFUSED_KINDS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class JointPart:
-    """A joint as its file describes it: its links, its pose in its parent, and its motion."""
+    """A joint as its file describes it: its links, its pose in its parent, and its motion.
+
+    `follows` is the element that names another joint, which it follows. A joint that is `held` at a position (m or
+    rad) is fixed; its pose has that position in it.
+    """
 
     name: str
-    line: int
+    element: Element
     kind: JointKind
     parent: str
     child: str
@@ -55,34 +60,90 @@ class JointPart:
     effort: float = inf
     speed: float = inf
     damping: float = 0.0
+    follows: Element | None = None
+    held: float = 0.0
 
 
-def read_joint(joint: Element, links: Iterable[str]) -> JointPart:
-    """Return a joint between these links. Raises AssetError."""
-    name, kind = name_of(joint), text_of(joint, "type")
+class _Limit:
+    """The limit of a joint: its ends, the greatest effort and the greatest speed."""
+
+    __slots__ = ("effort", "ends", "speed")
+
+    def __init__(self) -> None:
+        self.ends: tuple[float, float] | None = None
+        self.effort = self.speed = inf
+
+
+def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> JointPart | None:
+    """Return a joint between these links; None for one without a valid name or end."""
+    name = findings.read("", name_of, joint)
+    kind = findings.read("fixed", _kind, joint)
+    parent, child = (findings.read("", _end, joint, end, [*links]) for end in ("parent", "child"))
+    if parent and parent == child:
+        findings.error(joint, "a joint from a link to itself", parent)
+        return None
+    place = findings.read(UNMOVED, placed_by, joint)
+    follows = findings.read(None, joint.one_of, "mimic")
+    if not (name and parent and child):
+        return None
+    if kind == "fixed":
+        if follows is not None:
+            findings.note(follows, "passed over: mimic of joint", "it is fixed", name)
+        return JointPart(name, joint, kind, parent, child, place)
+    limit = _limit(joint, name, kind, findings)
+    if kind == "revolute" and limit.ends is None:
+        kind = "continuous"
+    dynamics = findings.read(None, joint.one_of, "dynamics")
+    damping = 0.0
+    if dynamics is not None:
+        damping = findings.read(0.0, number_of, dynamics, "damping", 0.0, NUMBER_MAX, 0.0)
+    axis = findings.read(X_AXIS, _axis, joint)
+    ends = limit.ends or (0.0, 0.0)
+    found = JointPart(name, joint, kind, parent, child, place, axis, ends, limit.effort, limit.speed, damping, follows)
+    if kind != "continuous" and ends[0] == ends[1]:
+        findings.note(joint, f"limits {ends[0]:g} to {ends[1]:g} hold joint", "it is fixed there", name)
+        return _held_at(found, ends[0])
+    _note_motor(found, findings)
+    return found
+
+
+def _note_motor(joint: JointPart, findings: Findings) -> None:
+    """Note a motor that does nothing, and one without bounds where the joint has a limit."""
+    for limit in joint.element.all_of("limit"):
+        if joint.effort == 0.0:
+            findings.note(limit, "an effort of 0, of joint", "its motor applies no force", joint.name)
+        if joint.speed == 0.0:
+            findings.note(limit, "a velocity of 0, of joint", "its motor cannot move it", joint.name)
+        for key in ("effort", "velocity"):
+            if key not in limit.attributes:
+                findings.note(limit, f"no {key} in the limit of joint", f"its motor has no greatest {key}", joint.name)
+
+
+def _kind(joint: Element) -> JointKind:
+    kind = text_of(joint, "type")
     if kind not in KINDS:
         hint = f": {REFUSED_KINDS[kind]}" if kind in REFUSED_KINDS else ""
         raise joint.error(f"an unknown type of joint, valid are {', '.join(KINDS)}{hint}", kind)
-    mimic = joint.one_of("mimic")
-    if mimic is not None:
-        raise mimic.error("a mimic joint: joints move independently of one another, a controller couples them", name)
-    parent, child = (_end(joint, end, [*links]) for end in ("parent", "child"))
-    if parent == child:
-        raise joint.error("a joint from a link to itself", parent)
-    place = placed_by(joint)
-    if kind == "fixed":
-        return JointPart(name, joint.line, "fixed", parent, child, place)
-    limits, effort, speed = _limit(joint, KINDS[kind])
-    dynamics = joint.one_of("dynamics")
-    damping = 0.0 if dynamics is None else number_of(dynamics, "damping", 0.0, NUMBER_MAX, 0.0)
-    return JointPart(name, joint.line, KINDS[kind], parent, child, place, _axis(joint), limits, effort, speed, damping)
+    return KINDS[kind]
+
+
+def _held_at(joint: JointPart, position: float) -> JointPart:
+    """Return a joint as one that is fixed at a position."""
+    place, orientation = joint.place
+    if joint.kind == "prismatic":
+        place = moved(place, rotate(orientation, joint.axis), position)
+    elif position != 0.0:
+        orientation = multiply(orientation, turn(joint.axis, position))
+    return JointPart(
+        joint.name, joint.element, "fixed", joint.parent, joint.child, Placed(place, orientation), held=position
+    )
 
 
 def _end(joint: Element, end: str, links: Sequence[str]) -> str:
     """Return the link that a joint begins or ends at."""
     found = joint.one_of(end)
     if found is None:
-        raise joint.error(f"a joint without {end}", joint.attributes["name"])
+        raise joint.error(f"a joint without {end}", joint.attributes.get("name", ""))
     name = text_of(found, "link")
     if name not in links:
         raise found.error("no link of this name", name, nearest_name(name, links))
@@ -101,56 +162,65 @@ def _axis(joint: Element) -> Vector:
     return x / length, y / length, z / length
 
 
-def _limit(joint: Element, kind: JointKind) -> tuple[tuple[float, float], float, float]:
-    """Return the limits, the greatest effort and the greatest speed of a joint that moves."""
-    limit = joint.one_of("limit")
+def _limit(joint: Element, name: str, kind: JointKind, findings: Findings) -> _Limit:
+    """Return the limit of a joint that moves; `ends` are None for one that turns without end."""
+    found = _Limit()
+    limit = findings.read(None, joint.one_of, "limit")
     if limit is None:
-        if kind == "continuous":
-            return (0.0, 0.0), inf, inf
-        raise joint.error(f"a {kind} joint without limit", joint.attributes["name"])
-    effort, speed = number_of(limit, "effort", 0.0, NUMBER_MAX), number_of(limit, "velocity", 0.0, NUMBER_MAX)
-    if speed == 0.0:
-        raise limit.error("velocity of limit is 0: the greatest speed of a joint that moves is above it")
+        if kind != "continuous":
+            findings.error(joint, f"a {kind} joint without limit", name)
+        return found
+    found.effort, found.speed = (
+        findings.read(inf, number_of, limit, key, 0.0, inf, inf) for key in ("effort", "velocity")
+    )
     if kind == "continuous":
-        return (0.0, 0.0), effort, speed
+        return found
+    if "lower" not in limit.attributes and "upper" not in limit.attributes:
+        if kind == "prismatic":
+            findings.error(limit, "limit of a prismatic joint without lower and upper", name)
+        else:
+            findings.note(limit, "neither lower nor upper in the limit of joint", "it turns without end", name)
+        return found
     most = EXTENT_MAX_M if kind == "prismatic" else ANGLE_MAX_RAD
-    low, high = (number_of(limit, key, -most, most, 0.0) for key in ("lower", "upper"))
-    if low > high:
-        raise limit.error(f"reversed limits: lower is {low:g}, upper {high:g}")
-    if low == high:
-        also = "" if kind == "prismatic" else ", or continuous"
-        raise limit.error(f"limits {low:g} to {high:g}, between which nothing moves: the type is fixed{also}")
-    return (low, high), effort, speed
+    low, high = (findings.read(0.0, number_of, limit, key, -inf, inf, 0.0) for key in ("lower", "upper"))
+    if kind == "revolute" and low < -most and most < high:
+        findings.note(limit, f"limits beyond {most:g} rad, of joint", "it turns without end", name)
+        return found
+    if max(abs(low), abs(high)) > most:
+        findings.error(limit, f"limits {low:g} to {high:g} are not within -{most:g} to {most:g}", name)
+    elif low > high:
+        findings.error(limit, f"reversed limits: lower is {low:g}, upper {high:g}", name)
+    else:
+        found.ends = low, high
+    return found
 
 
 # --- the tree --------------------------------------------------------------------------------------------------------
 
+Tree = list[tuple[LinkPart, JointPart | None]]
+"""Links from the root on, each with the joint that it hangs on: parents first, in the order of the joints."""
 
-def in_tree(
-    file: str, links: Sequence[LinkPart], joints: Sequence[JointPart]
-) -> list[tuple[LinkPart, JointPart | None]]:
-    """Return links from the root on, each with the joint that it hangs on: parents first, in the joints' order.
 
-    Raises AssetError where they are no tree: a link with two parents, several roots, a loop, a part without a mover.
-    """
+def in_tree(links: Sequence[LinkPart], joints: Sequence[JointPart]) -> Tree:
+    """Return links as a tree. Raises BadElement for a link with two parents, several roots, a loop."""
     above: dict[str, JointPart] = {}
     for joint in joints:
         other = above.setdefault(joint.child, joint)
         if other is not joint:
-            by = f"by the joints {other.name} (line {other.line}) and {joint.name}"
-            raise AssetError(f"{file}:{joint.line}: a loop: {joint.child} has two parents, {by}; links are a tree")
+            by = f"by the joints {other.name} (line {other.element.line}) and {joint.name}"
+            raise joint.element.error(f"a loop: {joint.child} has two parents, {by}; links are a tree")
     roots = [link for link in links if link.name not in above]
     if not roots:
-        raise AssetError(f"{file}:{joints[0].line}: a loop: each link hangs on another one; links are a tree")
+        raise joints[0].element.error("a loop: each link hangs on another one; links are a tree")
     if len(roots) > 1:
-        named = ", ".join(f"{link.name} (line {link.line})" for link in roots[:8])
-        raise AssetError(f"{file}:{roots[1].line}: {len(roots)} links that hang on none, there is one root: {named}")
+        named = ", ".join(f"{link.name} (line {link.element.line})" for link in roots[:8])
+        raise roots[1].element.error(f"{len(roots)} links that hang on none, there is one root: {named}")
     below: dict[str, list[JointPart]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
     by_name = {link.name: link for link in links}
-    found: list[tuple[LinkPart, JointPart | None]] = []
-    waiting: list[tuple[LinkPart, JointPart | None]] = [(roots[0], None)]
+    found: Tree = []
+    waiting: Tree = [(roots[0], None)]
     while waiting:
         found.append(waiting.pop())
         following = below.get(found[-1][0].name, [])
@@ -159,24 +229,58 @@ def in_tree(
         reached = {link.name for link, _ in found}
         lost = next(link for link in links if link.name not in reached)
         what = describe("a loop: a link that does not hang on the root", lost.name)
-        raise AssetError(f"{file}:{lost.line}: {what}; links are a tree")
-    _check_masses(file, found)
+        raise lost.element.error(f"{what}; links are a tree")
     return found
 
 
-def _check_masses(file: str, tree: Sequence[tuple[LinkPart, JointPart | None]]) -> None:
-    """Refuse joints without a load: their links, with all that is fixed to them, have no mass."""
-    mover: dict[str, JointPart | None] = {}
-    moved: dict[str, float] = {}
-    for link, joint in tree:
-        if joint is None or joint.kind in MOVING:
-            mover[link.name] = joint
-        else:
-            mover[link.name] = mover[joint.parent]
-        its = mover[link.name]
-        if its is not None:
-            moved[its.name] = moved.get(its.name, 0.0) + link.mass.mass
-    for link, joint in tree:
-        if joint is not None and joint.kind in MOVING and moved[joint.name] == 0.0:
-            what = f"the joint {joint.name} moves nothing: {link.name}, with all that is fixed to it, has no mass"
-            raise AssetError(f"{file}:{link.line}: {what}; it needs an inertial")
+# --- joints that follow others ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Following:
+    """A joint is at `ratio` times the position of the joint `leader`, which follows none, and `offset` (m or rad)."""
+
+    leader: str
+    ratio: float
+    offset: float
+
+
+def followers_of(joints: Sequence[JointPart], findings: Findings) -> tuple[list[JointPart], dict[str, Following]]:
+    """Return joints, and how those that follow another do, by name; one whose leader is fixed is fixed, too."""
+    by_name = {joint.name: joint for joint in joints}
+    made: list[JointPart] = []
+    following: dict[str, Following] = {}
+    for joint in joints:
+        its = None if joint.follows is None else findings.read(None, _followed, joint, by_name)
+        if its is None:
+            made.append(joint)
+            continue
+        leader = by_name[its.leader]
+        if leader.kind in MOVING and its.ratio != 0.0:
+            following[joint.name] = its
+            made.append(joint)
+            continue
+        assert joint.follows is not None
+        position = its.ratio * leader.held + its.offset
+        findings.note(
+            joint.follows, f"joint {joint.name} follows {leader.name}", f"that does not move it, it is at {position:g}"
+        )
+        made.append(_held_at(joint, position))
+    return made, following
+
+
+def _followed(joint: JointPart, joints: Mapping[str, JointPart]) -> Following:
+    """Return how a joint follows the first joint of its chain. Raises BadElement."""
+    ratio, offset, seen, own = 1.0, 0.0, [joint.name], joint.follows or joint.element
+    while joint.follows is not None:
+        mimic = joint.follows
+        offset += ratio * number_of(mimic, "offset", -NUMBER_MAX, NUMBER_MAX, 0.0)
+        ratio *= number_of(mimic, "multiplier", -NUMBER_MAX, NUMBER_MAX, 1.0)
+        name = text_of(mimic, "joint")
+        if name not in joints:
+            raise mimic.error("no joint of this name to follow", name, nearest_name(name, joints))
+        if name in seen:
+            raise own.error("a joint that follows itself", " > ".join((*seen, name)))
+        seen.append(name)
+        joint = joints[name]
+    return Following(joint.name, ratio, offset)

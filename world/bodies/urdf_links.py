@@ -1,28 +1,33 @@
-"""Links of a URDF: their masses, their collision shapes, and a colour for these."""
+"""Links of a URDF: their masses, and their collision shapes. Sources of looks are in urdf_visuals.py."""
 
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from foosim.common.errors import BadValue
+from foosim.world.bodies.findings import Findings
 from foosim.world.bodies.inertia import (
+    MASS_MIN_KG,
     NO_MASS,
     NO_TENSOR,
     MassOf,
     Principal,
     Tensor,
+    ball_moments,
     check_mass,
     check_moments,
     placed,
     principal_of,
+    solid_of,
 )
 from foosim.world.bodies.urdf_values import (
     EXTENT_MAX_M,
     EXTENT_MIN_M,
     NUMBER_MAX,
+    UNMOVED,
     name_of,
     number_of,
     placed_by,
@@ -30,7 +35,7 @@ from foosim.world.bodies.urdf_values import (
     vector_of,
 )
 from foosim.world.bodies.xml_tree import Element
-from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError
+from foosim.world.matter.mesh import MESH_SUFFIXES, AssetError, mesh_format
 from foosim.world.scene import (
     ORIGIN,
     UPRIGHT,
@@ -47,10 +52,12 @@ from foosim.world.scene import (
 )
 from foosim.world.scenery import path_problem
 
-GREY: Final[Colour] = (0.6, 0.6, 0.6, 1.0)
 SCALE_MIN: Final = 1e-6
 SCALE_MAX: Final = 1e6
 PACKAGE: Final = "package://"
+MISSING: Final = "the file of a mesh is missing"
+PRIMITIVES: Final = ("box", "sphere", "cylinder", "capsule")
+SHAPES: Final = (*PRIMITIVES, "mesh")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,80 +68,100 @@ class LinkPart:
     """
 
     name: str
-    line: int
+    element: Element
     mass: MassOf
     moments: Vector
     principal: Quaternion
     shapes: tuple[Shape, ...]
+    visuals: tuple[Shape, ...] = ()
 
 
-def mesh_paths(robot: Element) -> dict[str, Element]:
-    """Return the files that collision shapes name, in their order, by path, each with the line that names it first.
-
-    Raises AssetError for a path outside of the asset folder.
-    """
-    found: dict[str, Element] = {}
+def meshes_in(robot: Element, part: str) -> Iterator[Element]:
+    """Yield the meshes of all collisions, or visuals, of a robot."""
     for link in robot.all_of("link"):
-        for collision in link.all_of("collision"):
-            for mesh in collision.below("mesh"):
-                found.setdefault(mesh_path(mesh), mesh)
-    return found
+        for owner in link.all_of(part):
+            yield from owner.below("mesh")
 
 
 def mesh_path(mesh: Element) -> str:
-    """Return the path, inside the asset folder, of a mesh: `package://a/b` is a/b there, any other is seen from the
-    folder of the URDF file. Raises AssetError."""
+    """Return the path of a mesh in the asset folder. Raises BadElement.
+
+    `package://a/b` is a/b there, any other path is relative to the folder of the URDF file.
+    """
     written = text_of(mesh, "filename")
     if written.startswith(PACKAGE):
-        path = posixpath.normpath(written.removeprefix(PACKAGE))
-    elif ":" in written:
-        raise mesh.error(f"a mesh is a path, or {PACKAGE} and one inside the asset folder", written)
+        path = posixpath.normpath(written.removeprefix(PACKAGE).lstrip("/"))
+    elif "://" in written:
+        raise mesh.error(f"a mesh is a path relative to this file, or {PACKAGE}PACKAGE/PATH", written)
     else:
         path = posixpath.normpath(posixpath.join(posixpath.dirname(mesh.file), written))
     problem = path_problem(path)
     if problem:
         raise mesh.error(problem, written)
-    if path[path.rfind(".") :] not in MESH_SUFFIXES:
+    if not mesh_format(path):
         raise mesh.error(f"no format of a mesh, there are {', '.join(MESH_SUFFIXES)}", written)
     return path
 
 
-def read_link(link: Element, colours: Mapping[str, Colour], files: Mapping[str, bytes]) -> LinkPart:
-    """Return a link; `files` are the contents of the meshes, by path. Raises AssetError."""
-    name = name_of(link)
-    mass, principal = _mass(link)
-    colour = next((found for found in _colours_of(link, colours)), GREY)
-    shapes = tuple(_shape(collision, colour, files) for collision in link.all_of("collision"))
-    return LinkPart(name, link.line, mass, principal.moments, principal.axes, shapes)
+def read_link(link: Element, colour: Colour, files: Mapping[str, bytes], findings: Findings) -> LinkPart | None:
+    """Return a link, whose shapes have this colour, without its looks; None for one without a valid name.
+
+    `files` are the contents of the meshes, by path.
+    """
+    name = findings.read("", name_of, link)
+    found = [findings.read(None, _shape, one, colour, files, findings) for one in link.all_of("collision")]
+    shapes = tuple([shape for shape in found if shape is not None])
+    mass, principal = _mass(link, name, shapes if len(shapes) == len(found) else (), findings)
+    return LinkPart(name, link, mass, principal.moments, principal.axes, shapes) if name else None
 
 
-def _mass(link: Element) -> tuple[MassOf, Principal]:
-    """Return the mass of a link in its frame, with its principal moments and axes; one without inertial has none."""
-    inertial = link.one_of("inertial")
+# --- masses ----------------------------------------------------------------------------------------------------------
+
+
+def _mass(link: Element, name: str, shapes: Sequence[Shape], findings: Findings) -> tuple[MassOf, Principal]:
+    """Return the mass of a link in its frame, with its principal moments and axes."""
+    nothing = NO_MASS, Principal(ORIGIN, UPRIGHT)
+    inertial = findings.read(None, link.one_of, "inertial")
     if inertial is None:
-        return NO_MASS, Principal(ORIGIN, UPRIGHT)
-    weight, inertia = inertial.one_of("mass"), inertial.one_of("inertia")
-    if weight is None or inertia is None:
-        raise inertial.error(f"an inertial without {'mass' if weight is None else 'inertia'}", link.attributes["name"])
-    mass = number_of(weight, "value", -NUMBER_MAX, NUMBER_MAX)
-    tensor = _tensor(inertia)
-    if mass == 0.0 and tensor == NO_TENSOR:
-        return NO_MASS, Principal(ORIGIN, UPRIGHT)
-    try:
-        check_mass(mass)
-    except BadValue as bad:
-        raise weight.error(bad.problem) from None
+        return nothing
+    mass = findings.read(None, _mass_value, inertial)
+    tensor = findings.read(NO_TENSOR, _tensor, inertial)
+    position, orientation = findings.read(UNMOVED, placed_by, inertial)
+    if mass is None:
+        return nothing
+    if mass < MASS_MIN_KG:
+        findings.note(inertial, f"a mass below {MASS_MIN_KG * 1e6:g} mg, of link", "it counts as none", name)
+        return nothing
     moments, axes = principal_of(tensor)
     try:
         check_moments(mass, moments)
     except BadValue as bad:
-        raise inertia.error(bad.problem) from None
-    position, orientation = placed_by(inertial)
-    whole = placed(MassOf(mass, ORIGIN, tensor), position, orientation)
-    return whole, Principal(moments, multiply(orientation, axes) if orientation != UPRIGHT else axes)
+        moments, axes, where = _moments_instead(mass, moments, shapes)
+        used = f"{', '.join(f'{moment:.3g}' for moment in moments)} kg m2, {where}"
+        findings.note(inertial, f"inertia of link {name}", f"{bad.problem}; instead it has {used}")
+        return MassOf(mass, position, NO_TENSOR), Principal(moments, axes)
+    return MassOf(mass, position, NO_TENSOR), Principal(
+        moments, multiply(orientation, axes) if orientation != UPRIGHT else axes
+    )
 
 
-def _tensor(inertia: Element) -> Tensor:
+def _mass_value(inertial: Element) -> float:
+    weight = inertial.one_of("mass")
+    if weight is None:
+        return 0.0
+    mass = number_of(weight, "value", -NUMBER_MAX, NUMBER_MAX)
+    try:
+        return 0.0 if 0.0 <= mass < MASS_MIN_KG else check_mass(mass)
+    except BadValue as bad:
+        raise weight.error(bad.problem) from None
+
+
+def _tensor(inertial: Element) -> Tensor:
+    """Return the inertia about the axes of the inertial's origin; without one it is 0."""
+    inertia = inertial.one_of("inertia")
+    if inertia is None:
+        return NO_TENSOR
+
     def moment(key: str, default: float | None = None) -> float:
         return number_of(inertia, key, -NUMBER_MAX, NUMBER_MAX, default)
 
@@ -142,21 +169,52 @@ def _tensor(inertia: Element) -> Tensor:
     return xx, moment("ixy", 0.0), moment("ixz", 0.0), yy, moment("iyz", 0.0), zz
 
 
+def _moments_instead(mass: float, moments: Vector, shapes: Sequence[Shape]) -> tuple[Vector, Quaternion, str]:
+    """Return moments, axes and their source for a link whose file has impossible ones: those of its shapes at its mass;
+    without shapes the file's, spread evenly over the axes; where these are 0, those of a ball."""
+    mean = (moments[0] + moments[1] + moments[2]) / 3.0
+    ball = ball_moments(mass)
+    choices = [
+        (Principal((mean, mean, mean), UPRIGHT), "its sum spread evenly"),
+        (Principal(ball, UPRIGHT), "a ball of the density of water"),
+    ]
+    if shapes:
+        choices.insert(0, (principal_of(solid_of(shapes, mass).tensor), "its collision shapes filled evenly"))
+    for (found, axes), where in choices:
+        try:
+            check_moments(mass, found)
+        except BadValue:
+            continue
+        return found, axes, where
+    raise AssertionError(mass)
+
+
 # --- shapes ----------------------------------------------------------------------------------------------------------
 
 
-def _shape(collision: Element, colour: Colour, files: Mapping[str, bytes]) -> Shape:
-    geometry = collision.one_of("geometry")
+def _shape(collision: Element, colour: Colour, files: Mapping[str, bytes], findings: Findings) -> Shape:
+    position, orientation = findings.read(UNMOVED, placed_by, collision)
+    shape = shape_in(collision)
+    geometry = _hull(shape, files) if shape.tag == "mesh" else primitive(shape)
+    return Shape(geometry, "", colour, position, orientation)
+
+
+def shape_in(owner: Element) -> Element:
+    """Return the shape of a collision or visual. Raises BadElement."""
+    geometry = owner.one_of("geometry")
     if geometry is None:
-        raise collision.error("a collision without geometry")
-    if len(geometry.children) != 1:
-        raise geometry.error(f"a geometry with {len(geometry.children)} shapes: it has one")
-    (shape,) = geometry.children
-    position, orientation = placed_by(collision)
-    return Shape(_geometry(shape, files), "", colour, position, orientation)
+        raise owner.error(f"a {owner.tag} without geometry")
+    shapes = [*geometry.all_of(*SHAPES)]
+    if not shapes and geometry.children:
+        raise geometry.children[0].error(f"an unknown shape, there are {', '.join(SHAPES)}", geometry.children[0].tag)
+    if len(shapes) != 1:
+        raise geometry.error(f"a geometry with {len(shapes)} shapes: it has one")
+    return shapes[0]
 
 
-def _geometry(shape: Element, files: Mapping[str, bytes]) -> Box | Sphere | Cylinder | Capsule | Hull:
+def primitive(shape: Element) -> Box | Sphere | Cylinder | Capsule:
+    """Return a shape that is no mesh. Raises BadElement."""
+
     def extent(key: str) -> float:
         return number_of(shape, key, EXTENT_MIN_M, EXTENT_MAX_M)
 
@@ -173,9 +231,7 @@ def _geometry(shape: Element, files: Mapping[str, bytes]) -> Box | Sphere | Cyli
             return Cylinder(extent("radius"), extent("length"))
         case "capsule":
             return Capsule(extent("radius"), extent("length"))
-        case "mesh":
-            return _hull(shape, files)
-    raise shape.error("an unknown shape, there are box, sphere, cylinder, capsule, mesh", shape.tag)
+    raise AssertionError(shape.tag)
 
 
 def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
@@ -185,11 +241,9 @@ def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
 
     path = mesh_path(mesh)
     if path not in files:
-        raise mesh.error("the file of a mesh is missing", path)
-    scale = vector_of(mesh, "scale", SCALE_MAX, (1.0, 1.0, 1.0))
+        raise mesh.error(MISSING, path)
+    scale = scale_of(mesh)
     most = max(abs(part) for part in scale)
-    if min(abs(part) for part in scale) < SCALE_MIN:
-        raise mesh.error(f"scale of mesh is below {SCALE_MIN:g}", mesh.attributes["scale"])
     try:
         points = read_mesh(path, files[path], most).vertices
         return Hull(convex_hull(points * [part / most for part in scale]))
@@ -199,40 +253,9 @@ def _hull(mesh: Element, files: Mapping[str, bytes]) -> Hull:
         raise mesh.error(f"a mesh without a convex hull: {bad.problem}", path) from None
 
 
-# --- colours ---------------------------------------------------------------------------------------------------------
-
-
-def materials_of(robot: Element) -> dict[str, Colour]:
-    """Return the colours of a file's materials, by name: the first one of each."""
-    found: dict[str, Colour] = {}
-    for material in (
-        *robot.all_of("material"),
-        *(of for link in robot.all_of("link") for of in link.below("material")),
-    ):
-        colour = _colour(material)
-        if colour is not None:
-            found.setdefault(material.attributes.get("name", ""), colour)
-    return found
-
-
-def _colours_of(link: Element, colours: Mapping[str, Colour]) -> Iterator[Colour]:
-    """Yield the colours of a link's visuals."""
-    for visual in link.all_of("visual"):
-        for material in visual.all_of("material"):
-            colour = _colour(material) or colours.get(material.attributes.get("name", ""))
-            if colour is not None:
-                yield colour
-
-
-def _colour(material: Element) -> Colour | None:
-    colour = material.one_of("color")
-    if colour is None:
-        return None
-    words = text_of(colour, "rgba").split()
-    try:
-        red, green, blue, alpha = map(float, words)
-    except ValueError:
-        raise colour.error("a colour has 4 numbers: red, green, blue, alpha", colour.attributes["rgba"]) from None
-    if not all(0.0 <= share <= 1.0 for share in (red, green, blue, alpha)):
-        raise colour.error("a share of a colour is not within 0 to 1", colour.attributes["rgba"])
-    return red, green, blue, alpha
+def scale_of(mesh: Element) -> Vector:
+    """Return the factors along the axes of a mesh. Raises BadElement."""
+    scale = vector_of(mesh, "scale", SCALE_MAX, (1.0, 1.0, 1.0))
+    if min(abs(part) for part in scale) < SCALE_MIN:
+        raise mesh.error(f"scale of mesh is below {SCALE_MIN:g}", mesh.attributes["scale"])
+    return scale

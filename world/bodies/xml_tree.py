@@ -7,6 +7,7 @@ Pure: the content is given.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
@@ -21,6 +22,7 @@ DEPTH_MAX: Final = 32
 ATTRIBUTES_MAX: Final = 32
 TEXT_LENGTH_MAX: Final = 1000
 """Of a name and of a value."""
+_LATE_DECLARATION: Final = re.compile(rb"\s+<\?xml\s[^>]*\?>")
 _CUT_OFF: Final = tuple(
     expat.errors.codes[text]
     for text in (
@@ -31,6 +33,14 @@ _CUT_OFF: Final = tuple(
     )
 )
 """Errors of a content that ends too early. Of an unclosed tag or comment expat has the line in which it begins."""
+
+
+class BadElement(AssetError):
+    """An invalid element of a file: the problem in words, and the line of the element."""
+
+    def __init__(self, file: str, line: int, problem: str) -> None:
+        super().__init__(f"{file}:{line}: {problem}")
+        self.line, self.problem = line, problem
 
 
 @dataclass(slots=True)
@@ -52,10 +62,13 @@ class Element:
         return (child for child in self.children if child.tag in tags)
 
     def one_of(self, *tags: str) -> Element | None:
-        """Return the one element in it of these names, None without one. Raises AssetError for several."""
+        """Return the one element in it of these names, None without one. Raises BadElement for different ones."""
         found = [*self.all_of(*tags)]
-        if len(found) > 1:
-            raise found[1].error(f"a second {found[1].tag} in the {self.tag} of line {self.line}")
+        for other in found[1:]:
+            if (other.attributes, other.children) != (found[0].attributes, found[0].children):
+                raise other.error(
+                    f"a second {other.tag} in the {self.tag} of line {self.line}, different from the first"
+                )
         return found[0] if found else None
 
     def below(self, *tags: str) -> Iterator[Element]:
@@ -65,9 +78,9 @@ class Element:
                 yield child
             yield from child.below(*tags)
 
-    def error(self, what: str, value: object = ABSENT, nearest: str | None = None) -> AssetError:
+    def error(self, what: str, value: object = ABSENT, nearest: str | None = None) -> BadElement:
         """Return the error for an invalid part of this element."""
-        return AssetError(f"{self.place}: {describe(what, value, nearest)}")
+        return BadElement(self.file, self.line, describe(what, value, nearest))
 
 
 def read_xml(name: str, content: bytes) -> Element:
@@ -77,6 +90,8 @@ def read_xml(name: str, content: bytes) -> Element:
     if not content.strip():
         raise AssetError(f"{name}:1: an empty file")
     reading = _Reading(name)
+    if _LATE_DECLARATION.match(content):
+        content = _LATE_DECLARATION.sub(_blank, content, count=1)
     try:
         reading.parser.Parse(content, True)
     except expat.ExpatError as error:
@@ -86,6 +101,11 @@ def read_xml(name: str, content: bytes) -> Element:
         raise AssetError(f"{name}:1: no XML, {describe('an unsupported encoding', str(error))}") from None
     assert reading.root is not None, "expat refuses a document without an element"
     return reading.root
+
+
+def _blank(declaration: re.Match[bytes]) -> bytes:
+    """Return the lines of a declaration without their text. Blank lines above it are no XML, but many files have them."""
+    return b"\n" * declaration[0].count(b"\n")
 
 
 class _Reading:

@@ -15,14 +15,28 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-MESH_SUFFIXES: Final = (".obj", ".stl")
-"""The formats of files with a mesh."""
+    Part = tuple[NDArray[np.float64], NDArray[np.int32], tuple[float, float, float, float] | None]
+    """Corners (n, 3) in m, triangles (m, 3) by their numbers, and the colour that a file gives them."""
+
+MESH_SUFFIXES: Final = (".obj", ".stl", ".dae")
+"""The formats of files with a mesh; a file's may be in capitals."""
 
 
 class AssetError(Refused):
     """A file that a deployment refers to is invalid: `file:line: what, value`."""
 
     exit_code = 2
+
+
+def mesh_format(path: str) -> str:
+    """Return which of the formats the name of a file has, in small letters; empty for no such one."""
+    suffix = path[path.rfind(".") :].lower()
+    return suffix if suffix in MESH_SUFFIXES else ""
+
+
+def too_many(place: str, most: int) -> AssetError:
+    """Return the error for a file whose mesh has more triangles than `most`."""
+    return AssetError(f"{place}: more than {most} triangles")
 
 
 @dataclass(frozen=True, slots=True)

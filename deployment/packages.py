@@ -1,0 +1,63 @@
+"""Where the file of a mesh is that a robot's file names as `package://PACKAGE/PATH`: folders are searched for it.
+
+ROS finds packages by an index of its installations, which another machine has not. Here a package is a folder of its
+name: in the asset folder, around the robot's file in there, or above the asset folder. Last comes the package that the
+robot's file is in, whatever its folder is called. No link is followed (`read_files`), and only a mesh is looked for.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from foosim.deployment.text.files import AbsentFile, read_files
+
+ABOVE_MAX: Final = 5
+"""The count of folders above the asset folder in which a package is looked for."""
+_NAMED: Final = re.compile(rb"package:/*([^\"'<>]+)")
+
+
+def read_mesh_file(folder: Path, assets: str, robot: str, content: bytes, mesh: str, bytes_max: int) -> bytes:
+    """Return the content of a mesh's file that the robot's file `robot`, with this content, names.
+
+    Paths are those inside the asset folder `assets` of a folder. Raises AssetError, AbsentFile where there is none.
+    """
+    named = {posixpath.normpath(path) for path in _NAMED.findall(content)}
+    packaged = mesh.encode() in named
+    absent: AbsentFile | None = None
+    for root, inside, path in _places(folder, assets, robot, mesh) if packaged else [(folder, assets, mesh)]:
+        try:
+            return read_files(root, inside, [path], bytes_max=bytes_max)[path]
+        except AbsentFile as error:
+            absent = absent or error
+    assert absent is not None
+    top = [*(folder / assets).resolve().parents][:ABOVE_MAX][-1:]
+    more = f", around {robot}, and in the folders above up to {top[0]}" if packaged and top else ""
+    raise AbsentFile(f"{absent}{more}")
+
+
+def _places(folder: Path, assets: str, robot: str, mesh: str) -> Iterator[tuple[Path, str, str]]:
+    """Yield a folder, the asset folder in it, and the path in there, of each place where a mesh may be."""
+    package, _, rest = mesh.partition("/")
+    yield folder, assets, mesh
+    around = robot.split("/")[:-1]
+    inner = [around[:depth] for depth in range(len(around), 0, -1)]
+    for ancestor in inner:
+        if ancestor[-1] == package:
+            yield folder, assets, "/".join((*ancestor, rest))
+        yield folder, assets, "/".join((*ancestor, mesh))
+    root = (folder / assets).resolve()
+    if root.name == package:
+        yield folder, assets, rest
+    for above in [*root.parents][:ABOVE_MAX]:
+        if above.name == package:
+            yield above, ".", rest
+        yield above, ".", mesh
+    for ancestor in (*inner, []):
+        yield folder, assets, "/".join((*ancestor, rest))
+    for above in [*root.parents][:ABOVE_MAX]:
+        if (above / "package.xml").is_file():
+            yield above, ".", rest

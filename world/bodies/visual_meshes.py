@@ -1,0 +1,136 @@
+"""What a robot looks like: meshes of its visuals in drawn form, few triangles with the colours of their materials.
+
+A visual mesh is a large file that only a viewer needs, so a deployment has it in this form only, under a name of its
+own. One that is missing or unreadable is drawn by nothing, and its drawn form has the reason: it is never an error.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import msgspec
+
+from foosim.common import limits
+from foosim.world.matter.mesh import AssetError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from foosim.world.scene import Colour
+
+    Part = tuple[NDArray[np.float64], NDArray[np.int32], Colour | None]
+
+DRAWN_SUFFIX: Final = ".visual"
+TRIANGLES_MAX: Final = 5_000
+"""Of a mesh in drawn form."""
+SPARED: Final = 16
+"""A part of a mesh keeps as many triangles, where it has them, however few its share would be."""
+COLOURS_MAX: Final = 64
+BAD: Final = "no drawn form of a mesh"
+
+
+class _DrawnPart(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """Triangles of one colour: corners (float32, m) and their numbers (uint16), little-endian."""
+
+    vertices: bytes
+    triangles: bytes
+    colour: tuple[float, float, float, float] | None
+
+
+class _Drawn(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A mesh in drawn form: how many triangles its file has, its parts, and why there are none."""
+
+    triangles: int
+    parts: list[_DrawnPart]
+    problem: str = ""
+
+
+def drawn_path(path: str) -> str:
+    """Return the name of the drawn form of the mesh in this file."""
+    return path + DRAWN_SUFFIX
+
+
+def undrawn_path(path: str) -> str:
+    """Return the mesh's file of which this path names the drawn form; empty if it names none."""
+    return path.removesuffix(DRAWN_SUFFIX) if path.endswith(DRAWN_SUFFIX) else ""
+
+
+def drawn_content(name: str, content: bytes, triangles_max: int = TRIANGLES_MAX) -> bytes:
+    """Return the drawn form of the mesh in a file's content; `name` is the file's. It has at most `triangles_max`."""
+    from foosim.world.mesh_files import read_parts  # brings numpy
+
+    try:
+        parts = read_parts(name, content, limits.VISUAL_TRIANGLES_MAX)
+    except AssetError as error:
+        return undrawn_content(str(error))
+    return _packed(parts, triangles_max)
+
+
+def undrawn_content(problem: str) -> bytes:
+    """Return the drawn form of a mesh that cannot be drawn."""
+    return msgspec.msgpack.encode(_Drawn(0, [], problem))
+
+
+def drawn_parts(content: bytes) -> tuple[list[Part], str]:
+    """Return the parts of a mesh in drawn form, in m, each with its own colour if it has one; and a remark.
+
+    The remark is why there are none, or how coarse they are; empty for a mesh that is whole.
+    """
+    import numpy as np
+
+    try:
+        drawn = msgspec.msgpack.decode(content, type=_Drawn)
+        parts: list[Part] = []
+        for part in drawn.parts:
+            vertices = np.frombuffer(part.vertices, "<f4").reshape(-1, 3).astype(np.float64)
+            triangles = np.frombuffer(part.triangles, "<u2").reshape(-1, 3).astype(np.int32)
+            if not len(triangles) or triangles.max() >= len(vertices) or not np.isfinite(vertices).all():
+                return [], BAD
+            parts.append((vertices, triangles, part.colour))
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, ValueError):
+        return [], BAD
+    count = sum(len(triangles) for _, triangles, _ in parts)
+    coarse = f"{count:,} of {drawn.triangles:,} triangles are drawn" if count < drawn.triangles else ""
+    return parts, drawn.problem or coarse
+
+
+def _packed(parts: list[Part], triangles_max: int) -> bytes:
+    whole = sum(len(triangles) for _, triangles, _ in parts)
+    share = min(1.0, triangles_max / whole) if whole else 1.0
+    packed = []
+    for colour, (vertices, triangles) in _by_colour(parts).items():
+        vertices, triangles = _decimated(vertices, triangles, max(int(len(triangles) * share), SPARED))
+        if len(triangles):
+            packed.append(_DrawnPart(vertices.astype("<f4").tobytes(), triangles.astype("<u2").tobytes(), colour))
+    return msgspec.msgpack.encode(_Drawn(whole, packed))
+
+
+def _by_colour(parts: list[Part]) -> dict[Colour | None, tuple[NDArray[np.float64], NDArray[np.int32]]]:
+    """Return the triangles of each colour, with corners at one place as one; of too many colours the first ones."""
+    import numpy as np
+    from foosim.world.mesh_files import merged
+
+    corners: dict[Colour | None, list[NDArray[np.float64]]] = {}
+    for vertices, triangles, colour in parts:
+        known = colour if colour in corners or len(corners) < COLOURS_MAX else next(iter(corners))
+        corners.setdefault(known, []).append(vertices[triangles].reshape(-1, 3))
+    return {colour: merged(np.concatenate(found)) for colour, found in corners.items()}
+
+
+def _decimated(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int32], most: int
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Return a mesh with at most so many triangles: fewer by joining corners, and then the largest ones alone."""
+    if len(triangles) <= most:
+        return vertices, triangles
+    import fast_simplification
+    import numpy as np
+
+    vertices, triangles = fast_simplification.simplify(vertices, triangles, target_count=most)
+    if len(triangles) > most:
+        one, other, third = (vertices[triangles[:, corner]] for corner in range(3))
+        areas = np.linalg.norm(np.cross(other - one, third - one), axis=1)
+        triangles = triangles[np.sort(np.argsort(-areas, kind="stable")[:most])]
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    return vertices[used], renumbered.reshape(-1, 3).astype(np.int32)
