@@ -89,7 +89,7 @@ JointKind: TypeAlias = Literal["free", "prismatic", "revolute", "continuous", "f
 @dataclass(frozen=True, slots=True)
 class Mimic:
     """A joint follows another one: its position is `ratio` times that of the joint of the link `leader` (an index among
-    the links of the body), and `offset` (m or rad)."""
+    the links of the body), which follows none, and `offset` (m or rad)."""
 
     leader: int
     ratio: float = 1.0
@@ -216,15 +216,21 @@ def inertia_about(link: Link, axis: Vector, centre: Vector) -> float:
 
 def load_of(body: Body, index: int) -> float:
     """Return the load of a motor on the joint of a link while all others rest: for one that slides the mass (kg) of its
-    link and of all links that hang on that, for one that turns the moment of inertia (kg m2) of its link."""
+    link and of all links that hang on that, for one that turns the moment of inertia (kg m2) of its link. Joints that
+    follow it add theirs, times the square of their ratio."""
     link = body.links[index]
-    if link.joint != "prismatic":
-        return inertia_about(link, link.axis, link.centre_of_mass)
-    carried = {index}
+    if link.joint == "prismatic":
+        carried = {index}
+        for number, other in enumerate(body.links):
+            if other.parent in carried:
+                carried.add(number)
+        load = sum([body.links[number].mass for number in sorted(carried)])
+    else:
+        load = inertia_about(link, link.axis, link.centre_of_mass)
     for number, other in enumerate(body.links):
-        if other.parent in carried:
-            carried.add(number)
-    return sum([body.links[number].mass for number in sorted(carried)])
+        if other.mimic is not None and other.mimic.leader == index:
+            load += other.mimic.ratio * other.mimic.ratio * load_of(body, number)
+    return load
 
 
 def cross(a: Vector, b: Vector) -> Vector:

@@ -19,7 +19,7 @@ from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.placing import At
-from foosim.world.scene import Body, Link
+from foosim.world.scene import MOVING, Body, Link
 from foosim.world.scenery import AssetPath
 from foosim.world.spec import WorldSpec
 
@@ -108,7 +108,7 @@ class Urdf(Model):
             view.write(at.slot("position"), *position)
             view.write(at.slot("orientation"), *orientation)
         if body.joints:
-            view.write(at.slot("joint_positions"), *[_start(link) for link in body.joints])
+            view.write(at.slot("joint_positions"), *starts_of(body))
         view.write(at.slot("contacts"), 0.0, 0.0, -1.0)
 
     def excite(self, view: WritableView) -> None:
@@ -116,10 +116,29 @@ class Urdf(Model):
         if self._body.is_free:
             view.write(self._at.slot("linear_velocity"), 0.5, 0.2, 0.0)
         if self._body.joints:
-            view.write(self._at.slot("joint_velocities"), *[0.1 for _ in self._body.joints])
+            speeds = [0.1 if link.mimic is None else 0.1 * link.mimic.ratio for link in self._body.joints]
+            view.write(self._at.slot("joint_velocities"), *speeds)
 
 
-def _start(link: Link) -> float:
-    """Return where a joint starts: at 0, or at its limit that is nearest to it."""
-    low, high = (-inf, inf) if link.joint == "continuous" else link.limits
-    return min(max(0.0, low), high)
+def starts_of(body: Body) -> list[float]:
+    """Return where the joints of a body start: at 0, or at the limit that is nearest to it.
+
+    A mimic joint starts where its leader has it; the leader starts where all its followers are within their limits, if
+    there is such a place.
+    """
+    found = {}
+    for index, link in enumerate(body.links):
+        low, high = _limits(link)
+        for other in body.links:
+            if other.mimic is not None and other.mimic.leader == index and other.mimic.ratio != 0.0:
+                ends = sorted([(end - other.mimic.offset) / other.mimic.ratio for end in _limits(other)])
+                low, high = min(max(low, ends[0]), high), max(min(high, ends[1]), low)
+        found[index] = min(max(0.0, low), high)
+    for index, link in enumerate(body.links):
+        if link.mimic is not None:
+            found[index] = link.mimic.ratio * found[link.mimic.leader] + link.mimic.offset
+    return [found[index] for index, link in enumerate(body.links) if link.joint in MOVING]
+
+
+def _limits(link: Link) -> tuple[float, float]:
+    return (-inf, inf) if link.joint == "continuous" else link.limits

@@ -20,9 +20,9 @@ from foosim.common.keyed_random import draw_key, draw_words, unit_interval
 from foosim.node.physics.mujoco_islands import CompositionEngine, Seats
 from foosim.node.physics.mujoco_model import ModelBuilder, warnings
 from foosim.world.assembly.volumes import overlapping
-from foosim.world.components.drives import Drives, Motor
+from foosim.world.components.drives import FREE, Drives, Motor
 from foosim.world.layout import Entity
-from foosim.world.scene import Body, Capsule, Link, Vector
+from foosim.world.scene import Body, Box, Capsule, Link, Mimic, Vector
 from tests.solids import TICK_S, Solids, box, shape
 
 SEED: Final = 20
@@ -40,7 +40,8 @@ def draw(purpose: int, tick: int, low: float = 0.0, high: float = 1.0) -> float:
 
 
 def arm(name: str, x: float) -> Body:
-    """Seven links on the floor, whose axes are across one another in turns: their motors couple."""
+    """Seven links on the floor, whose axes are across one another in turns: their motors couple. Two fingers on the
+    last one, of which the second follows the first."""
     links = []
     for number in range(JOINTS):
         links.append(
@@ -55,6 +56,21 @@ def arm(name: str, x: float) -> Body:
                 limits=(-pi, pi),
                 parent=number - 1,
                 position=(0.0, 0.0, 0.1 if number == 0 else 0.16),
+            )
+        )
+    for side in (1.0, -1.0):
+        links.append(
+            Link(
+                f"{name}/finger{side:g}",
+                "prismatic",
+                (shape(Box((0.01, 0.01, 0.03)), position=(0.0, side * 0.05, 0.0)),),
+                0.1,
+                (1e-4, 1e-4, 1e-4),
+                axis=(0.0, 1.0, 0.0),
+                limits=(-0.03, 0.03),
+                parent=JOINTS - 1,
+                position=(0.0, 0.0, 0.2),
+                mimic=None if side > 0.0 else Mimic(JOINTS, -1.0),
             )
         )
     return Body(name, "arm", (x, 0.0, 0.0), tuple(links))
@@ -184,9 +200,11 @@ class Comparison:
         for number in range(len(PLACES_M)):
             name = f"arm{number}"
             wanted = [draw(100 + 10 * number + joint, tick // 40, -1.2, 1.2) for joint in range(JOINTS)]
-            at = self.world.get(name, "joint_positions")
+            *at, finger, _ = self.world.get(name, "joint_positions")
             speeds = [min(max(6.0 * (to - now), -4.0), 4.0) for to, now in zip(wanted, at, strict=True)]
-            self.world.drives[name] = Drives(tuple(Motor(speed, 60.0) for speed in speeds))
+            motors = [Motor(speed, 60.0) for speed in speeds]
+            motors.append(Motor(6.0 * (draw(200 + number, tick // 40, -0.03, 0.03) - finger), 20.0))
+            self.world.drives[name] = Drives((*motors, FREE))
 
 
 def compared(ticks: int, kind: type[Comparison] = Comparison, *, until_it_differs: bool = False) -> Outcome:
