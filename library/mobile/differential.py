@@ -10,6 +10,7 @@ from pydantic import model_validator
 
 from foosim.common import units
 from foosim.common.errors import BadValue
+from foosim.common.finding import Location
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity, custom_error
 from foosim.library.mobile.vehicles import DARK, Acceleration, Slip, Speed, TurnRate, Vehicle, mark_of, mast
@@ -110,11 +111,11 @@ class DifferentialDriveRobot(Vehicle):
             yield "speed_limit must be at least twice speed, the speed of the top of a wheel"
 
     @property
-    def felt_surfaces(self) -> Mapping[str, str]:
+    def felt_surfaces(self) -> Mapping[Location, str]:
         """The surfaces that rigid bodies feel of it, by the setting that names them."""
         if self.dynamics != "rigid":
             return {}
-        return {"surface": self.surface, "tyres": self.tyres, "dynamics": FRICTIONLESS}
+        return {("surface",): self.surface, ("tyres",): self.tyres, ("dynamics",): FRICTIONLESS}
 
     @property
     def centre_height(self) -> float:

@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from foosim.common import units
+from foosim.common.finding import Location
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
 from foosim.world.component_types.settings import RobotSettings
@@ -41,9 +42,9 @@ class QuadrotorRobot(RobotSettings):
     speed_limit: SpeedLimit = default("30 m/s")
 
     @property
-    def felt_surfaces(self) -> Mapping[str, str]:
+    def felt_surfaces(self) -> Mapping[Location, str]:
         """The surface of all its shapes."""
-        return {"surface": self.surface}
+        return {("surface",): self.surface}
 
     @property
     def side(self) -> float:

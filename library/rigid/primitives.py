@@ -8,6 +8,7 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from foosim.common import units
+from foosim.common.finding import Location
 from foosim.common.spec_base import Name, default
 from foosim.common.units import Quantity
 from foosim.world.bodies.inertia import principal_of, solid
@@ -48,9 +49,9 @@ class ObjectSettings(EntitySettings):
     radio: Radio | None = None
 
     @property
-    def felt_surfaces(self) -> Mapping[str, str]:
+    def felt_surfaces(self) -> Mapping[Location, str]:
         """The surface of all its shapes."""
-        return {"surface": self.surface}
+        return {("surface",): self.surface}
 
 
 class RigidObject(Model):

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from math import inf
 from typing import Annotated
 
 from pydantic import AfterValidator, Field, StringConstraints
 
 from foosim.common import units
-from foosim.common.errors import BadValue
-from foosim.common.spec_base import default
+from foosim.common.errors import BadValue, UnknownName
+from foosim.common.finding import Location
+from foosim.common.spec_base import PartName, default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.bodies.urdf import SUFFIX, Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
 from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS
@@ -18,6 +20,7 @@ from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
+from foosim.world.matter.physics import DEFAULT
 from foosim.world.placing import At
 from foosim.world.scene import MOVING, Body, Link
 from foosim.world.scenery import AssetPath
@@ -39,19 +42,22 @@ class UrdfRobot(RobotSettings):
     """A robot from a URDF file in the asset folder: `at` is the pose of its first link.
 
     The base is held there if it is `fixed`, else the first link is free, and `speed_limit` is how fast any part of the
-    robot usually is. `surface` is that of all its shapes.
+    robot usually is. `surface` is that of all its shapes, or those of links by their names or by patterns of these: the
+    first that matches counts, and a link without one has the surface `default`.
     """
 
     file: UrdfPath
     at: At = Field(default_factory=At)
     fixed: bool
-    surface: Surface = "default"
+    surface: Surface | dict[PartName, Surface] = DEFAULT
     speed_limit: SpeedLimit = default("30 m/s")
 
     @property
-    def felt_surfaces(self) -> Mapping[str, str]:
-        """The surface of all its shapes."""
-        return {"surface": self.surface}
+    def felt_surfaces(self) -> Mapping[Location, str]:
+        """The surfaces of its shapes, by setting."""
+        if isinstance(self.surface, str):
+            return {("surface",): self.surface}
+        return {("surface", pattern): surface for pattern, surface in self.surface.items()}
 
     def asset_paths(self, files: Mapping[str, bytes]) -> Sequence[str]:
         """Return the URDF file, and the meshes of collision shapes that it names."""
@@ -74,9 +80,21 @@ def _slots(settings: UrdfRobot, spec: WorldSpec) -> dict[str, int]:
     problem = "" if settings.fixed else free_base_problem(robot)
     if problem:
         raise BadValue(problem, settings.file)
+    _surfaces(settings, robot)
     joints = len(robot.moving)
     moving = dict.fromkeys(JOINTS, joints) if joints else {}
     return {**({} if settings.fixed else BODY), **moving, "quarantined": 1, "down": 1, **CONTACTS, "refused": 1}
+
+
+def _surfaces(settings: UrdfRobot, robot: Robot) -> list[str]:
+    """Return the surface of each link. Raises UnknownName for a pattern that matches none."""
+    chosen = settings.surface if isinstance(settings.surface, dict) else {"*": settings.surface}
+    names = [link.name for link in robot.links]
+    for pattern in chosen:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise UnknownName("a surface of no link", pattern, names)
+    matching = ([its for pattern, its in chosen.items() if fnmatchcase(name, pattern)] for name in names)
+    return [(*found, DEFAULT)[0] for found in matching]
 
 
 @model("urdf", UrdfRobot, slots=_slots, is_rigid=True)
@@ -86,13 +104,14 @@ class Urdf(Model):
     def __init__(self, settings: UrdfRobot, at: Mounting) -> None:
         self._settings, self._at = settings, at
         where = settings.at
+        robot = robot_of(settings, at.spec)
         self._body = body_of(
-            robot_of(settings, at.spec),
+            robot,
             at.robot.name,
             where.position,
             where.orientation,
             fixed=settings.fixed,
-            surface=settings.surface,
+            surfaces=_surfaces(settings, robot),
             speed_limit=settings.speed_limit,
         )
 

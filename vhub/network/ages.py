@@ -90,9 +90,12 @@ class Ages:
         return taken
 
     def unreported(self, tick: int) -> list[Age]:
-        """Return the counts since the last row up to the closing of a tick, by client, source and channel."""
+        """Return the counts since the last row up to the closing of a tick, by client, source and channel.
+
+        A run that ends before its first closing, whose tick is -1, has them at tick 0.
+        """
         return [
-            Age(tick, client, heard.source, heard.channel, dict(heard.recent))
+            Age(max(tick, 0), client, heard.source, heard.channel, dict(heard.recent))
             for client, pairs in sorted(self._heard.items())
             for heard in pairs.values()
             if heard.recent

@@ -80,8 +80,8 @@ def _unfelt(spec: WorldSpec, *, has_rigid: bool) -> Iterator[Finding]:
         made.append((("scenery", name, "surface"), f"scenery {name}", [thing.surface], scenery))
     for section, entities in (("objects", spec.objects), ("robots", spec.robots)) if has_rigid else ():
         for name, one in entities.items():
-            for key, surface in one.felt_surfaces.items():
-                made.append(((section, name, key), f"{one.model} {name}", [surface], felt.sides))
+            for place, surface in one.felt_surfaces.items():
+                made.append(((section, name, *place), f"{one.model} {name}", [surface], felt.sides))
     for location, what, surfaces, known in made:
         for surface in dict.fromkeys(surfaces):
             if surface != NO_SURFACE and surface not in known:

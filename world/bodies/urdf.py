@@ -238,6 +238,7 @@ def _link(
     return replace(
         made,
         joint=joint.kind,
+        joint_name=joint.name,
         axis=joint.axis,
         limits=joint.limits,
         parent=index[joint.parent],
@@ -285,15 +286,19 @@ def body_of(
     orientation: Quaternion,
     *,
     fixed: bool,
-    surface: str,
+    surfaces: Sequence[str],
     speed_limit: float = 0.0,
 ) -> Body:
-    """Return a robot as the body `name`, the frame of its first link at this pose; its links are `name/LINK`.
+    """Return a robot as the body `name`, the frame of its first link at this pose; its links are `name/LINK`, with the
+    surface of each.
 
     A fixed body's base has that pose. A free body's first link is free; where it has no mass of its own, it has that of
     the links that are fixed to it, which keep their shapes.
     """
-    links = [replace(link, name=f"{name}/{link.name}", shapes=_with(link.shapes, surface)) for link in robot.links]
+    links = [
+        replace(link, name=f"{name}/{link.name}", shapes=_with(link.shapes, surface))
+        for link, surface in zip(robot.links, surfaces, strict=True)
+    ]
     if fixed:
         return Body(name, "urdf", position, tuple(links), orientation=orientation, antenna_link=0)
     assert not free_base_problem(robot), robot.name

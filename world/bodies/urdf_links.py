@@ -20,7 +20,6 @@ from foosim.world.bodies.inertia import (
     ball_moments,
     check_mass,
     check_moments,
-    placed,
     principal_of,
     solid_of,
 )

@@ -115,6 +115,7 @@ def _packed(parts: list[Part], triangles_max: int) -> bytes:
 def _by_colour(parts: list[Part]) -> dict[Colour | None, tuple[NDArray[np.float64], NDArray[np.int32]]]:
     """Return the triangles of each colour, with corners at one place as one; of too many colours the first ones."""
     import numpy as np
+
     from foosim.world.mesh_files import merged
 
     corners: dict[Colour | None, list[NDArray[np.float64]]] = {}
@@ -133,6 +134,7 @@ def _decimated(
         return vertices, triangles
     import fast_simplification
     import numpy as np
+
     from foosim.world.mesh_files import merged
 
     vertices, triangles = fast_simplification.simplify(vertices, triangles, target_count=most)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Self
 from pydantic import Field, PrivateAttr, SerializeAsAny, StringConstraints
 
 from foosim.common import limits, names
+from foosim.common.finding import Location
 from foosim.common.spec_base import Name, Offset, Rate, SpecBase, default
 
 MODIFIERS_MAX: Final = 8
@@ -79,8 +80,8 @@ class EntitySettings(TypedSettings):
     tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
 
     @property
-    def felt_surfaces(self) -> Mapping[str, str]:
-        """The surfaces that rigid bodies feel of it, by the setting that names them."""
+    def felt_surfaces(self) -> Mapping[Location, str]:
+        """The surfaces that rigid bodies feel of it, by the place of the setting that names them."""
         return {}
 
 
