@@ -93,7 +93,8 @@ def place_of_mesh(path: str, content: bytes, mesh: str) -> str:
 
 
 def _mesh_elements(path: str, content: bytes) -> dict[str, Element]:
-    robot, found = _robot_of(path, content), {}
+    robot = _robot_of(path, content)
+    found: dict[str, Element] = {}
     for part, path_of in (("collision", mesh_path), ("visual", _drawn_mesh)):
         for mesh in meshes_in(robot, part):
             try:

@@ -19,7 +19,6 @@ from foosim.world.bodies.inertia import (
     ball_moments,
     check_mass,
     check_moments,
-    placed,
     principal_of,
     solid_of,
 )
@@ -213,7 +212,7 @@ def shape_in(owner: Element) -> Element:
 
 
 def primitive(shape: Element) -> Box | Sphere | Cylinder | Capsule:
-    """Return a shape that is no mesh. Raises BadElement."""
+    """Return a primitive shape. Raises BadElement."""
 
     def extent(key: str) -> float:
         return number_of(shape, key, EXTENT_MIN_M, EXTENT_MAX_M)
