@@ -209,6 +209,16 @@ def test_shapes_have_shares_of_a_mass_by_their_volumes() -> None:
     assert alone.tensor == pytest.approx(turned(solid(box.geometry, 3.0).tensor, box.orientation))
 
 
+@pytest.mark.parametrize("fixed", [True, False])
+def test_moments_that_a_file_has_rounded_up_are_computed(fixed: bool) -> None:
+    plate = inertial("1", ixx="0.083", iyy="0.083", izz="0.167") + BALL
+    robot = read(link("a", plate), link("b", plate), joint("j", "ab"))
+    body = body_of(robot, "r", (0.0, 0.0, 2.0), UPRIGHT, fixed=fixed, surface="default", speed_limit=9.0)
+    assert robot.notes == () and [one.inertia for one in body.links] == [(0.083, 0.083, 0.166)] * 2
+    with closing(Solids([body])) as one:  # MuJoCo refuses others
+        one.run(1)
+
+
 SLIDER: Final = (
     link("w", ""),
     link("x", ""),
