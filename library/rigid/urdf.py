@@ -14,7 +14,17 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.common.finding import Location
 from foosim.common.spec_base import PartName, default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.bodies.urdf import SUFFIX, Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
+from foosim.world.bodies.urdf import (
+    SUFFIX,
+    XACRO,
+    Robot,
+    body_of,
+    free_base_problem,
+    meshes_of,
+    read_urdf,
+    start_of,
+    unexpanded,
+)
 from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
@@ -28,6 +38,8 @@ from foosim.world.spec import WorldSpec
 
 
 def _urdf_path(path: str) -> str:
+    if path.endswith(XACRO):
+        raise custom_error(BadValue(unexpanded(path)))
     if not path.endswith(SUFFIX):
         raise custom_error(BadValue(f"no URDF file, which ends with {SUFFIX}", path))
     return path

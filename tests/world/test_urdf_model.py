@@ -121,6 +121,10 @@ def test_a_bad_file_is_refused_at_planning(folder: Path, file: str, what: str) -
     [
         ("robots.arm.file=../arm.urdf", "a path inside the asset folder has no empty component"),
         ("robots.arm.file=models/arm.sdf", "no URDF file, which ends with .urdf, 'models/arm.sdf'"),
+        (
+            "robots.arm.file=a/b.urdf.xacro",
+            r"a file of xacro, which makes a URDF file .*: xacro b\.urdf\.xacro > b\.urdf",
+        ),
         ("robots.arm.fixed=", "robots.arm.fixed: "),
     ],
 )
@@ -256,7 +260,7 @@ def test_it_is_listed_and_has_its_state_by_its_settings() -> None:
 def test_inspecting_reads_meshes_from_the_asset_folder(folder: Path) -> None:
     robot = read_robot(folder / "models" / "cart.urdf", folder)
     assert robot.file == "models/cart.urdf" and robot.moving == ("axle",)
-    assert read_robot(folder / "models" / "cart.urdf", None) == robot, "the nearest folder that has all meshes"
+    assert read_robot(folder / "models" / "cart.urdf", None) == robot, "its mesh is beside the folder of the file"
     with pytest.raises(AssetError, match="not in the asset folder"):
         read_robot(folder / "models" / "cart.urdf", folder / "meshes")
     (folder / "meshes" / "shard.obj").unlink()

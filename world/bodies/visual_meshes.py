@@ -25,7 +25,7 @@ DRAWN_SUFFIX: Final = ".visual"
 TRIANGLES_MAX: Final = 5_000
 """Of a mesh in drawn form."""
 SPARED: Final = 16
-"""A part of a mesh keeps as many triangles, where it has them, however few its share would be."""
+"""Triangles that each colour of a mesh keeps, before the others are shared out."""
 COLOURS_MAX: Final = 64
 GRIDS: Final = (256, 128, 64, 32, 16)
 """Cells along the longest side of a mesh."""
@@ -70,6 +70,8 @@ def drawn_content(name: str, content: bytes, triangles_max: int = TRIANGLES_MAX)
         return undrawn_content(str(error))
     if not all(abs(vertices).max(initial=0.0) < FAR for vertices, _, _ in parts):  # nan is not, either
         return undrawn_content(f"{name}: a coordinate is too large or not finite")
+    if not any(len(triangles) for _, triangles, _ in parts):
+        return undrawn_content(f"{name}: no triangle")
     return _packed(parts, triangles_max)
 
 
@@ -103,10 +105,12 @@ def drawn_parts(content: bytes) -> tuple[list[Part], str]:
 
 def _packed(parts: list[Part], triangles_max: int) -> bytes:
     whole = sum(len(triangles) for _, triangles, _ in parts)
-    share = min(1.0, triangles_max / whole) if whole else 1.0
+    found = _by_colour(parts)
+    share = max(0.0, triangles_max - SPARED * len(found)) / whole
     packed = []
-    for colour, (vertices, triangles) in _by_colour(parts).items():
-        vertices, triangles = _decimated(vertices, triangles, max(int(len(triangles) * share), SPARED))
+    for colour, (vertices, triangles) in found.items():
+        if whole > triangles_max:
+            vertices, triangles = _decimated(vertices, triangles, SPARED + int(len(triangles) * share))
         if len(triangles):
             packed.append(_DrawnPart(vertices.astype("<f4").tobytes(), triangles.astype("<u2").tobytes(), colour))
     return msgspec.msgpack.encode(_Drawn(whole, packed))
