@@ -31,8 +31,8 @@ def block(language: str) -> str:
 
 
 def test_the_page_shows_what_the_command_prints(tmp_path: Path, inspected: Command) -> None:
-    (tmp_path / "turret.urdf").write_text(block("xml"))
-    assert inspected("turret.urdf") == (0, block("text"), "")
+    (tmp_path / "scout.urdf").write_text(block("xml"))
+    assert inspected("scout.urdf") == (0, block("text"), "")
 
 
 def test_json_has_the_tree_in_si_units(inspected: Command) -> None:

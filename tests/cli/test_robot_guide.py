@@ -31,7 +31,7 @@ def files() -> dict[str, str]:
     """The files that the guide has, by name."""
     named = dict(re.findall(r"^```(?:yaml|python)\n# ([\w.]+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))
     (urdf,) = re.findall(r"^```xml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-    return {"turret.urdf": urdf, **named}
+    return {"scout.urdf": urdf, **named}
 
 
 def commands() -> list[list[str]]:
@@ -77,9 +77,9 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]
         line = " ".join(words)
         assert code == (DIFFERS if words[:3] == ["foosim", "capture", "diff"] else 0), f"{line}:\n{text}"
         found[line] = text
-    assert {"live.mcap", "turret.mcap", "two.mcap", "commands.csv", "turret.html"} <= {p.name for p in folder.iterdir()}
+    assert {"live.mcap", "scout.mcap", "two.mcap", "commands.csv", "scout.html"} <= {p.name for p in folder.iterdir()}
     yield found
-    del sys.modules["lookout"]
+    del sys.modules["driver"]
 
 
 def test_the_guide_goes_from_the_file_to_the_capture(printed: dict[str, str]) -> None:
@@ -87,24 +87,26 @@ def test_the_guide_goes_from_the_file_to_the_capture(printed: dict[str, str]) ->
         "foosim urdf",
         "foosim check",
         "foosim up",
-        "foosim rehearse turret.yaml",
+        "foosim rehearse scout.yaml",
         "foosim capture info",
         "foosim capture verify",
         "foosim capture export",
         "foosim capture report",
         "python look.py",
-        "foosim rehearse turret.yaml",
+        "foosim rehearse scout.yaml",
         "foosim capture diff",
     ]
     assert len(begins) == len(printed)
     assert all(line.startswith(words) for line, words in zip(printed, begins, strict=True)), printed.keys()
-    assert sorted(files()) == ["look.py", "lookout.py", "turret.urdf", "turret.yaml"]
+    assert sorted(files()) == ["look.py", "driver.py", "scout.urdf", "scout.yaml"]
 
 
-def test_the_head_finds_the_crate_and_stops(printed: dict[str, str]) -> None:
+def test_the_robot_rolls_as_far_as_its_wheels_turn(printed: dict[str, str]) -> None:
     numbers = [float(number) for number in re.findall(r"-?[0-9]+\.[0-9]+", printed["python look.py"])]
-    least, most, last = numbers
-    assert least == 0.0 and 0.79 < last <= most < 0.95, "the crate begins at 0.79 rad"
+    turned, driven, elbow = numbers
+    assert 1.2 < driven < 1.4, "it stops before the crate, whose front is 1.57 m before the eye"
+    assert 0.99 < driven / (0.1 * turned) <= 1.0
+    assert abs(elbow - 0.8) < 0.01
 
 
 def test_one_and_two_nodes_compute_the_same_world(printed: dict[str, str]) -> None:
