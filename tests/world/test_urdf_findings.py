@@ -18,7 +18,7 @@ from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content
 from foosim.world.components.drives import Drives, Motor
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.scene import ORIGIN, UPRIGHT, Box, Mimic, Shape, Sphere, from_rpy
-from tests.solids import Solids, physics
+from tests.solids import Solids, box, physics
 
 MASS: Final = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>'
 BALL: Final = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
@@ -261,6 +261,14 @@ def test_a_robot_with_links_without_a_mass_moves_as_its_heavy_ones_do() -> None:
         before = one.get("r", "joint_positions")
         one.run(100)
         assert one.get("r", "joint_positions") == pytest.approx(before, abs=1e-5)
+
+
+def test_a_fixed_robot_without_any_mass_carries_others() -> None:
+    table = body_of(read(link("a", BALL)), "t", (0.0, 0.0, 2.0), UPRIGHT, fixed=True, surface="default")
+    with closing(Solids([box("b", (0.1, 0.1, 0.1), 1.0), table], feel=physics())) as one:
+        one.put("b", (0.0, 0.0, 2.2))
+        one.run(50)
+        assert one.get("b", "position") == pytest.approx([0.0, 0.0, 2.2], abs=1e-3)
 
 
 def test_a_joint_in_a_robot_without_any_mass_moves_nothing() -> None:
