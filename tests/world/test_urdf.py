@@ -154,19 +154,11 @@ def test_an_inertia_is_that_of_its_file_in_the_links_frame() -> None:
     assert turret.centre_of_mass == (0.3, -0.2, 0.1)
 
 
-def test_what_is_passed_over_is_noted_with_its_lines() -> None:
-    (note,) = askew().notes
-    assert note.startswith("visual (line 11): a robot is drawn by its collision shapes")
-    text = robot_text(more='<transmission name="t"/><gazebo><mu1>1</mu1></gazebo><gazebo/><dance/>')
-    notes = read_urdf("a.urdf", {"a.urdf": text}).notes
-    assert [note.partition(" (")[0] for note in notes] == ["dance", "gazebo", "transmission"]
-    assert "gazebo (lines 2, 2): it is for another simulator" in notes
-
-
 def test_meshes_are_named_by_paths_inside_the_asset_folder() -> None:
-    assert meshes_of("robots/askew.urdf", ASKEW.encode()) == ("meshes/shard.obj",)
+    drawn = "robots/looks.dae.visual"
+    assert meshes_of("robots/askew.urdf", ASKEW.encode()) == ("meshes/shard.obj", drawn)
     packaged = ASKEW.replace("../meshes/", "package://pack/meshes/").encode()
-    assert meshes_of("robots/askew.urdf", packaged) == ("pack/meshes/shard.obj",)
+    assert meshes_of("robots/askew.urdf", packaged) == ("pack/meshes/shard.obj", drawn)
 
 
 # --- against Bullet --------------------------------------------------------------------------------------------------
@@ -395,14 +387,14 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "sdf": (b"<sdf version='1.7'/>", "1: no URDF: the outermost element is robot, 'sdf'"),
     "xacro": (
         b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">\n<xacro:include filename="a"/></robot>',
-        "2: an unexpanded file of xacro",
+        "2: a file of xacro, which makes a URDF file of it: xacro r.urdf > robot.urdf",
     ),
     "no links": (b"<robot/>", "1: a robot without links"),
     "no shapes": (b'<robot><link name="a"/></robot>', "1: a robot without a collision shape"),
     "no name": (robot_text("\n<link/>"), "3: link without name"),
-    "bad name": (robot_text('\n<link name="a b"/>'), "3: a name has letters, digits, .*'a b'"),
-    "path as name": (robot_text('\n<link name="../a"/>'), "3: a name has letters"),
-    "long name": (robot_text(f'\n<link name="{"a" * 65}"/>'), "3: a name has letters, .*at most 64"),
+    "empty name": (robot_text('\n<link name=" "/>'), "3: link with an empty name"),
+    "bad name": (robot_text('\n<link name="a&#133;b"/>'), "3: a name has at most 256 characters, none of control"),
+    "long name": (robot_text(f'\n<link name="{"a" * 257}"/>'), "3: a name has at most 256 characters"),
     "same links": (robot_text('\n<link name="a"/>'), "3: a link with the name of that of line 2, 'a'"),
     "same joints": (
         robot_text(more='\n<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'),
@@ -427,11 +419,10 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
         robot_text(kind="hinge"),
         "3: an unknown type of joint, valid are fixed, revolute, continuous, prismatic, 'hinge'",
     ),
-    "mimic": (robot_text(joint=LIMIT + '\n<mimic joint="k"/>'), "4: a mimic joint: .*'j'"),
     "zero axis": (robot_text(joint=LIMIT + '\n<axis xyz="0 0 0"/>'), "4: an axis without a direction, '0 0 0'"),
     "two axes": (
         robot_text(joint=LIMIT + '<axis xyz="1 0 0"/>\n<axis xyz="0 1 0"/>'),
-        "4: a second axis in the joint of line 3",
+        "4: a second axis in the joint of line 3, different from the first",
     ),
     "short axis": (robot_text(joint=LIMIT + '<axis xyz="1 0"/>'), "3: xyz of axis has 2 numbers, it has 3, '1 0'"),
     "no limit": (robot_text(joint="<axis xyz='0 0 1'/>"), "3: a revolute joint without limit, 'j'"),
@@ -439,16 +430,10 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
         robot_text(joint='<limit lower="1" upper="-1" effort="1" velocity="1"/>'),
         "3: reversed limits: lower is 1, upper -1",
     ),
-    "no way": (
-        robot_text(joint='<limit effort="1" velocity="1"/>'),
-        "3: limits 0 to 0, between which nothing moves: the type is fixed, or continuous",
-    ),
-    "no effort": (robot_text(joint='<limit lower="0" upper="1" velocity="1"/>'), "3: limit without effort"),
     "negative effort": (
         robot_text(joint='<limit lower="0" upper="1" effort="-1" velocity="1"/>'),
-        "3: effort of limit is not within 0 to 1e",
+        "3: effort of limit is not within 0 to inf",
     ),
-    "no speed": (robot_text(joint='<limit lower="0" upper="1" effort="1" velocity="0"/>'), "3: velocity of limit is 0"),
     "nan": (
         robot_text(joint='<limit lower="nan" upper="1" effort="1" velocity="1"/>'),
         "3: lower of limit is not a finite number, 'nan'",
@@ -463,24 +448,13 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     ),
     "overflow": (
         robot_text(joint='<limit lower="0" upper="1e999" effort="1" velocity="1"/>'),
-        "3: upper of limit is not within",
+        "3: upper of limit is not a finite number",
     ),
     "far": (robot_text(joint=LIMIT + '<origin xyz="0 0 1e4"/>'), "3: xyz of origin is not within -1000 to 1000"),
     "damping": (robot_text(joint=LIMIT + '<dynamics damping="-1"/>'), "3: damping of dynamics is not within 0"),
-    "moves nothing": (
-        robot_text().replace(MASS.encode(), b"", 2),
-        "2: the joint j moves nothing: b, with all that is fixed to it",
-    ),
-    "no mass": (inertial(**UNIT).replace(b'\n<mass value="1"/>', b""), "2: an inertial without mass, 'c'"),
     "negative mass": (inertial("-1", **UNIT), "3: a mass of -1 kg, valid are 1e-06 to"),
     "absurd mass": (inertial("1e8", **UNIT), r"3: a mass of 1e\+08 kg, valid are"),
-    "mass of 0": (inertial("0", **UNIT), "3: a mass of 0 kg"),
     "no moment": (inertial(ixx="1", iyy="1"), "4: inertia without izz"),
-    "moments of 0": (inertial(ixx="0", iyy="0", izz="0"), "4: principal moments of 0, 0 and 0 kg m2: each is above 0"),
-    "not definite": (inertial(ixx="1", ixy="2", iyy="1", izz="1"), "4: principal moments of -1, 1 and 3 kg m2"),
-    "no triangle": (inertial(ixx="1", iyy="1", izz="3"), "4: .*no body has one above the sum of both others, 2"),
-    "absurd inertia": (inertial(ixx="9e7", iyy="9e7", izz="9e7"), "4: .*a radius of gyration of 9486.83 m"),
-    "point mass": (inertial(ixx="1e-9", iyy="1e-9", izz="1e-9"), "4: .*a radius of gyration"),
     "no shape": (collision(""), r"4: a geometry with 0 shapes: it has one|3: a geometry with 0"),
     "cone": (
         collision('<cone radius="1"/>'),
@@ -490,29 +464,22 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "negative radius": (collision('<sphere radius="-1"/>'), "4: radius of sphere is not within"),
     "no radius": (collision('<cylinder length="1"/>'), "4: cylinder without radius"),
     "missing mesh": (collision('<mesh filename="a.stl"/>'), "4: the file of a mesh is missing, 'a.stl'"),
-    "collada": (collision('<mesh filename="a.dae"/>'), "4: no format of a mesh, there are .obj, .stl, 'a.dae'"),
     "out of folder": (
         collision('<mesh filename="../a.stl"/>'),
         "4: a path inside the asset folder has no empty component",
     ),
     "out of package": (collision('<mesh filename="package://p/../../a.stl"/>'), "4: a path inside the asset folder"),
     "absolute": (collision('<mesh filename="/etc/a.stl"/>'), "4: a path inside the asset folder is relative"),
-    "scheme": (collision('<mesh filename="file:///a.stl"/>'), "4: a mesh is a path, or package://"),
+    "scheme": (
+        collision('<mesh filename="file:///a.stl"/>'),
+        "4: a mesh is a path relative to this file, or package://PACKAGE/PATH",
+    ),
     "no scale": (collision('<mesh filename="shard.obj" scale="1 0 1"/>'), "4: scale of mesh is below 1e-06"),
     "flat mesh": (
         collision('<mesh filename="flat.obj"/>'),
         "4: a mesh without a convex hull: 3 different corners.*'flat.obj'",
     ),
     "bad mesh": (collision('<mesh filename="bad.obj"/>'), "4: an invalid mesh: bad.obj:1: "),
-    "colour": (robot_text(more='\n<material name="m"><color rgba="1 0"/></material>'), "3: a colour has 4 numbers"),
-    "bright": (
-        robot_text(more='\n<material name="m"><color rgba="2 0 0 1"/></material>'),
-        "3: a share of a colour is not",
-    ),
-    "plugin": (
-        robot_text(more='<gazebo>\n<plugin name="p" filename="libcontrol.so"/></gazebo>'),
-        "3: an unsupported plugin: .*'libcontrol.so'",
-    ),
     "loop joint": (
         robot_text(more='\n<loop_joint name="l"/>'),
         "3: not a part of URDF that makes a tree of links, 'loop_joint'",

@@ -93,7 +93,8 @@ def place_of_mesh(path: str, content: bytes, mesh: str) -> str:
 
 
 def _mesh_elements(path: str, content: bytes) -> dict[str, Element]:
-    robot, found = _robot_of(path, content), {}
+    robot = _robot_of(path, content)
+    found: dict[str, Element] = {}
     for part, path_of in (("collision", mesh_path), ("visual", _drawn_mesh)):
         for mesh in meshes_in(robot, part):
             try:
@@ -316,16 +317,25 @@ def _with(shapes: tuple[Shape, ...], surface: str) -> tuple[Shape, ...]:
     return tuple([replace(shape, surface=surface) for shape in shapes])
 
 
+def poses_of(links: Sequence[Link]) -> list[tuple[Vector, Quaternion]]:
+    """Return the poses of links in the frame of the first one, all joints at 0."""
+    poses: list[tuple[Vector, Quaternion]] = [(ORIGIN, UPRIGHT)]
+    for link in links[1:]:
+        position, orientation = poses[link.parent]
+        x, y, z = rotate(orientation, link.position)
+        place = position[0] + x, position[1] + y, position[2] + z
+        poses.append((place, multiply(orientation, link.orientation)))
+    return poses
+
+
 def _base(robot: Robot) -> dict[int, tuple[Vector, Quaternion]]:
     """Return the poses, in the first link's frame, of the links that are fixed to it, and its own."""
-    poses: dict[int, tuple[Vector, Quaternion]] = {0: (ORIGIN, UPRIGHT)}
+    held = {0}
     for number, link in enumerate(robot.links[1:], 1):
-        if link.joint == "fixed" and link.parent in poses:
-            position, orientation = poses[link.parent]
-            x, y, z = rotate(orientation, link.position)
-            place = position[0] + x, position[1] + y, position[2] + z
-            poses[number] = place, multiply(orientation, link.orientation)
-    return poses
+        if link.joint == "fixed" and link.parent in held:
+            held.add(number)
+    poses = poses_of(robot.links)
+    return {number: poses[number] for number in sorted(held)}
 
 
 def _base_mass(robot: Robot) -> MassOf:

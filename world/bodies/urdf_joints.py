@@ -79,13 +79,16 @@ def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> Join
     name = findings.read("", name_of, joint)
     kind = findings.read("fixed", _kind, joint)
     parent, child = (findings.read("", _end, joint, end, [*links]) for end in ("parent", "child"))
+    if parent and parent == child:
+        findings.error(joint, "a joint from a link to itself", parent)
+        return None
     place = findings.read(UNMOVED, placed_by, joint)
     follows = findings.read(None, joint.one_of, "mimic")
     if not (name and parent and child):
         return None
     if kind == "fixed":
         if follows is not None:
-            findings.note(follows, "a fixed joint follows none: passed over is the mimic of joint", "it is fixed", name)
+            findings.note(follows, "passed over: mimic of joint", "it is fixed", name)
         return JointPart(name, joint, kind, parent, child, place)
     limit = _limit(joint, name, kind, findings)
     if kind == "revolute" and limit.ends is None:
@@ -96,13 +99,24 @@ def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> Join
         damping = findings.read(0.0, number_of, dynamics, "damping", 0.0, NUMBER_MAX, 0.0)
     axis = findings.read(X_AXIS, _axis, joint)
     ends = limit.ends or (0.0, 0.0)
-    found = JointPart(
-        name, joint, kind, parent, child, place, axis, ends, limit.effort, limit.speed, damping, follows
-    )
+    found = JointPart(name, joint, kind, parent, child, place, axis, ends, limit.effort, limit.speed, damping, follows)
     if kind != "continuous" and ends[0] == ends[1]:
         findings.note(joint, f"limits {ends[0]:g} to {ends[1]:g} hold joint", "it is fixed there", name)
         return _held_at(found, ends[0])
+    _note_motor(found, findings)
     return found
+
+
+def _note_motor(joint: JointPart, findings: Findings) -> None:
+    """Note a motor that does nothing, and one without bounds where the joint has a limit."""
+    for limit in joint.element.all_of("limit"):
+        if joint.effort == 0.0:
+            findings.note(limit, "an effort of 0, of joint", "its motor applies no force", joint.name)
+        if joint.speed == 0.0:
+            findings.note(limit, "a velocity of 0, of joint", "its motor cannot move it", joint.name)
+        for key in ("effort", "velocity"):
+            if key not in limit.attributes:
+                findings.note(limit, f"no {key} in the limit of joint", f"its motor has no greatest {key}", joint.name)
 
 
 def _kind(joint: Element) -> JointKind:
@@ -159,13 +173,6 @@ def _limit(joint: Element, name: str, kind: JointKind, findings: Findings) -> _L
     found.effort, found.speed = (
         findings.read(inf, number_of, limit, key, 0.0, inf, inf) for key in ("effort", "velocity")
     )
-    if found.effort == 0.0:
-        findings.note(limit, "an effort of 0, of joint", "its motor applies no force", name)
-    if found.speed == 0.0:
-        findings.note(limit, "a velocity of 0, of joint", "its motor cannot move it", name)
-    for key, value in (("effort", found.effort), ("velocity", found.speed)):
-        if value == inf:
-            findings.note(limit, f"no {key} in the limit of joint", f"its motor has no greatest {key}", name)
     if kind == "continuous":
         return found
     if "lower" not in limit.attributes and "upper" not in limit.attributes:
@@ -239,7 +246,7 @@ class Following:
 
 
 def followers_of(joints: Sequence[JointPart], findings: Findings) -> tuple[list[JointPart], dict[str, Following]]:
-    """Return joints, and how those that follow another do, by name; one whose leader is fixed is fixed, too."""
+    """Return joints, and by name how a joint follows another; one whose leader is fixed is fixed, too."""
     by_name = {joint.name: joint for joint in joints}
     made: list[JointPart] = []
     following: dict[str, Following] = {}
@@ -264,7 +271,7 @@ def followers_of(joints: Sequence[JointPart], findings: Findings) -> tuple[list[
 
 def _followed(joint: JointPart, joints: Mapping[str, JointPart]) -> Following:
     """Return how a joint follows the first joint of its chain. Raises BadElement."""
-    ratio, offset, seen = 1.0, 0.0, [joint.name]
+    ratio, offset, seen, own = 1.0, 0.0, [joint.name], joint.follows or joint.element
     while joint.follows is not None:
         mimic = joint.follows
         offset += ratio * number_of(mimic, "offset", -NUMBER_MAX, NUMBER_MAX, 0.0)
@@ -273,7 +280,7 @@ def _followed(joint: JointPart, joints: Mapping[str, JointPart]) -> Following:
         if name not in joints:
             raise mimic.error("no joint of this name to follow", name, nearest_name(name, joints))
         if name in seen:
-            raise mimic.error("a joint that follows itself", " > ".join((*seen, name)))
+            raise own.error("a joint that follows itself", " > ".join((*seen, name)))
         seen.append(name)
         joint = joints[name]
     return Following(joint.name, ratio, offset)

@@ -1,9 +1,9 @@
 """Masses of a tree of links: each joint that moves needs one to move, so a link without a mass borrows from another.
 
 Files have links without a mass between two joints (the x, y and yaw of a base that slides) and at the end of one (the
-frame of a camera that pans). The equations of motion of such a link have no unique solution. It gets a thousandth of the
-heaviest link that it carries, which changes the motion of the robot by as little; one that carries none gets that of
-the nearest link with a mass that carries it.
+frame of a camera that pans). The equations of motion of such a link have no unique solution. It gets a thousandth of
+the heaviest link that it carries, which changes the motion of the robot by as little; one that carries none gets a
+thousandth of the nearest link with a mass that carries it.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ def with_masses(tree: Tree, findings: Findings) -> Tree:
     numbers = {link.name: number for number, (link, _) in enumerate(tree)}
     parents = [-1 if joint is None else numbers[joint.parent] for _, joint in tree]
     movers: list[int] = []
-    """Of each link the one that moves it: the first of those that are fixed to one another."""
+    """Of each link the one that moves it: the first link of the rigid part that it belongs to."""
     for number, (_, joint) in enumerate(tree):
         movers.append(number if joint is None or joint.kind in MOVING else movers[parents[number]])
     masses = [link.mass.mass for link, _ in tree]
     heaviest = [*range(len(tree))]
-    """Of each link the heaviest of it and those that it carries."""
+    """Of each link the heaviest among it and the links that it carries."""
     for number in range(len(tree) - 1, 0, -1):
         if masses[heaviest[number]] > masses[heaviest[parents[number]]]:
             heaviest[parents[number]] = heaviest[number]

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import inf
+from json import dumps
+from math import ceil, inf
 from typing import Any
 
 from foosim.common.names import is_robot_name
 from foosim.world.bodies.urdf import Robot, free_base_problem
-from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Shape, Sphere
+from foosim.world.bodies.urdf_base import base_of, height_of, wheels_of
+from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Mimic, Shape, Sphere
 
 MOST_DIGITS = 6
-WHEELS_MIN = 2
-"""One joint that turns without end may be the last one of an arm."""
+ROUNDING_M = 1e-6
+FIXED_DEPTH_M = 1e-3
+"""How deep in the floor the lowest point of a fixed robot may be."""
 
 
 def as_json(robot: Robot) -> dict[str, Any]:
@@ -25,6 +28,7 @@ def as_json(robot: Robot) -> dict[str, Any]:
         "links": [_link_json(robot, number) for number in range(len(robot.links))],
         "notes": list(robot.notes),
         "free_base": free_base_problem(robot) or None,
+        "fixed": base_of(robot)[0],
         "deployment": snippet(robot),
     }
 
@@ -45,6 +49,7 @@ def _link_json(robot: Robot, number: int) -> dict[str, Any]:
             "effort": _finite(link.effort) if moves else None,
             "speed": _finite(link.speed) if moves else None,
             "damping": link.damping if moves else None,
+            "follows": None if link.mimic is None else _mimic_json(robot, link.mimic),
         }
     return {
         "name": link.name,
@@ -56,8 +61,13 @@ def _link_json(robot: Robot, number: int) -> dict[str, Any]:
             {"shape": _shape_text(shape), "position": list(shape.position), "orientation": list(shape.orientation)}
             for shape in link.shapes
         ],
+        "visuals": len(link.visuals),
         "joint": joint,
     }
+
+
+def _mimic_json(robot: Robot, mimic: Mimic) -> dict[str, Any]:
+    return {"joint": robot.joints[mimic.leader], "ratio": mimic.ratio, "offset": mimic.offset}
 
 
 def _finite(value: float) -> float | None:
@@ -65,7 +75,7 @@ def _finite(value: float) -> float | None:
 
 
 def lines(robot: Robot) -> Iterator[str]:
-    """Yield the lines of a robot's tree, the elements passed over, and its entry in a deployment."""
+    """Yield the lines of a robot's tree, its notes, and its entry in a deployment."""
     moving = len(robot.moving)
     joints = f"{moving} joint{'' if moving == 1 else 's'} that move{'s' if moving == 1 else ''}"
     links = f"{len(robot.links)} link{'' if len(robot.links) == 1 else 's'}"
@@ -76,52 +86,58 @@ def lines(robot: Robot) -> Iterator[str]:
         depths.append(0 if link.parent < 0 else depths[link.parent] + 1)
         indent = "  " * depths[number]
         if link.parent >= 0:
-            yield f"{indent}{robot.joints[number]}: {_joint_text(link)}"
+            yield f"{indent}{robot.joints[number]}: {_joint_text(robot, link)}"
         yield f"{indent}{link.name}: {_mass_text(link)}"
         for shape in link.shapes:
             yield f"{indent}  {_shape_text(shape)}"
+        if link.visuals:
+            yield f"{indent}  looks of {len(link.visuals)} part{'' if len(link.visuals) == 1 else 's'}"
     yield ""
-    for note in robot.notes:
-        yield f"passed over: {note}"
+    yield from robot.notes
     problem = free_base_problem(robot)
     if problem:
         yield f"with `fixed: false`: {problem}"
-    yield "in a deployment:"
+    is_fixed, why = base_of(robot)
+    yield f"in a deployment, `fixed: {'true' if is_fixed else 'false'}`: {why}"
     yield ""
     yield from snippet(robot).rstrip().split("\n")
 
 
 def snippet(robot: Robot) -> str:
-    """Return the entry of a robot in a deployment, as YAML."""
+    """Return the entry of a robot in a deployment, as YAML: it stands on the floor, wheels by their speeds."""
     name = robot.name if is_robot_name(robot.name) else "robot"
-    is_fixed = "true" if len(_wheels(robot)) < WHEELS_MIN or free_base_problem(robot) else "false"
-    actuators = ", actuators: {joints: {kind: joint_position}}" if robot.moving else ""
-    placed = f"at: {{x: 0 m, y: 0 m}}, fixed: {is_fixed}"
-    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, {placed}{actuators}}}\n"
+    is_fixed, height = base_of(robot)[0], height_of(robot)
+    is_level = height <= (FIXED_DEPTH_M if is_fixed else ROUNDING_M)
+    at = "{x: 0 m, y: 0 m}" if is_level else f"{{x: 0 m, y: 0 m, z: {ceil(1000.0 * height)} mm}}"
+    wheels = wheels_of(robot)
+    led = [link.joint_name for link in robot.links if link.joint in MOVING and link.mimic is None]
+    others = [joint for joint in led if joint not in wheels]
+    parts = [("wheels", "joint_velocity", wheels), ("joints", "joint_position", others)]
+    are_both = bool(wheels and others)
+    shown = [
+        f"{part}: {{kind: {kind}{f', joints: {dumps(joints, ensure_ascii=False)}' if are_both else ''}}}"
+        for part, kind, joints in parts
+        if joints
+    ]
+    actuators = f", actuators: {{{', '.join(shown)}}}" if shown else ""
+    base = f"at: {at}, fixed: {'true' if is_fixed else 'false'}"
+    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, {base}{actuators}}}\n"
 
 
-def _wheels(robot: Robot) -> list[str]:
-    """Return the joints of possible wheels: links that turn without end, without moving links on them."""
-    carriers = set()
-    for link in robot.links:
-        if link.joint in MOVING:
-            parent = link.parent
-            while parent >= 0:
-                carriers.add(parent)
-                parent = robot.links[parent].parent
-    turning = [number for number, link in enumerate(robot.links) if link.joint == "continuous"]
-    return [robot.joints[number] for number in turning if number not in carriers]
-
-
-def _joint_text(link: Link) -> str:
+def _joint_text(robot: Robot, link: Link) -> str:
     if link.joint not in MOVING:
         return "fixed"
     unit, force = ("m", "N") if link.joint == "prismatic" else ("rad", "N m")
     text = f"{link.joint} {'along' if link.joint == 'prismatic' else 'about'} {_vector(link.axis)}"
     if link.joint != "continuous":
         text += f", {_short(link.limits[0])} to {_short(link.limits[1])} {unit}"
-    if link.effort != inf:
-        text += f", at most {_short(link.effort)} {force} and {_short(link.speed)} {unit}/s"
+    most = [(link.effort, force), (link.speed, f"{unit}/s")]
+    bounds = [f"{_short(value)} {of}" for value, of in most if value != inf]
+    if bounds:
+        text += f", at most {' and '.join(bounds)}"
+    if link.mimic is not None:
+        text += f", follows {robot.joints[link.mimic.leader]} x {_short(link.mimic.ratio)}"
+        text += f" + {_short(link.mimic.offset)} {unit}" if link.mimic.offset else ""
     return text + (f", damping {_short(link.damping)} {force} s/{unit}" if link.damping else "")
 
 

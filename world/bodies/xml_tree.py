@@ -66,7 +66,9 @@ class Element:
         found = [*self.all_of(*tags)]
         for other in found[1:]:
             if (other.attributes, other.children) != (found[0].attributes, found[0].children):
-                raise other.error(f"a second {other.tag} in the {self.tag} of line {self.line}, different from the first")
+                raise other.error(
+                    f"a second {other.tag} in the {self.tag} of line {self.line}, different from the first"
+                )
         return found[0] if found else None
 
     def below(self, *tags: str) -> Iterator[Element]:
@@ -102,7 +104,7 @@ def read_xml(name: str, content: bytes) -> Element:
 
 
 def _blank(declaration: re.Match[bytes]) -> bytes:
-    """Return the lines of a declaration without their text. Blank lines above it are no XML, but many files have them."""
+    """Return the lines of a declaration without their text: files have blank lines above it, which XML does not."""
     return b"\n" * declaration[0].count(b"\n")
 
 
