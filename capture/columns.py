@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import FrameRow, PacketRow
 from foosim.common.names import nearest_name
-from foosim.world.component_types.descriptions import ABSENT
+from foosim.world.component_types.descriptions import ABSENT, JOINTS
 from foosim.world.components.mounted import free_poses
 from foosim.world.frame import Frame
 from foosim.world.kinematics import CENTRE_OF_SLOT, forward_kinematics
@@ -134,13 +134,14 @@ class Frames:
         """Return one of them as a frame, from which a world can be continued; raises IndexError."""
         return Frame(int(self.ticks[index]), self.layout, np.array(self.values[index]), self.outboxes[index])
 
-    def column(self, entity: str, field: str, count: int = 1) -> Numbers:
-        """Return one field of an entity over time: (n,), or (n, count) for the first numbers of a field of several.
+    def column(self, entity: str, field: str, count: int = 1, *, joint: str = "") -> Numbers:
+        """Return one field of an entity over time: (n,), or (n, count) for the first numbers of a field of several, or
+        (n,) for the number of a joint by its name, as of `joint_positions`.
 
         Of a free body `position`, `orientation` and `linear_velocity` are of the origin of its first link, as on
         /tf and in its sensors' readings; `CENTRE_OF_SLOT` is of the link's centre of mass. The numbers are NaN
-        where the entity is absent. Raises CaptureError for an unknown entity or field, and for more numbers than the
-        field has.
+        where the entity is absent. Raises CaptureError for an unknown entity, field or joint, and for more numbers than
+        the field has.
         """
         if field not in self.fields(entity):
             raise self._unknown(entity, field)
@@ -148,9 +149,21 @@ class Frames:
         if field != ABSENT and self.layout[entity].can_leave:
             is_absent = self._slot(entity, ABSENT)[:, 0] != 0.0
             found = np.where(is_absent[:, np.newaxis], np.nan, found)
+        if joint:
+            return found[:, self._joint(entity, field, joint)]
         if not 1 <= count <= found.shape[1]:
             raise CaptureError(f"{entity}: {field} has 1 to {found.shape[1]} numbers, not {count}")
         return found[:, 0] if count == 1 else found[:, :count]
+
+    def _joint(self, entity: str, field: str, joint: str) -> int:
+        """Return the place of a joint's number in a field with a number for each."""
+        names = self.bodies[entity].joint_names if field in JOINTS and entity in self.bodies else ()
+        if joint not in names:
+            nearest = nearest_name(joint, names)
+            hint = f", nearest is {nearest}" if nearest else ""
+            there = f"; it has {', '.join(names)}" if names else ""
+            raise CaptureError(f"{self.name}: {field} of {entity} has no joint {joint!r}{hint}{there}")
+        return names.index(joint)
 
     def fields(self, entity: str) -> list[str]:
         """Return the names of an entity's columns, none for an unknown entity."""

@@ -21,9 +21,9 @@ from foosim.capture.mcap.format import Message
 from foosim.capture.rows import PACKETS, ROW_TYPES, PacketRow, Row
 from foosim.common.errors import Malformed, UnknownName, no_such
 from foosim.common.json_text import encode_json
-from foosim.deployment.channel_kinds import channel_codec
+from foosim.deployment.channel_kinds import Channel, channels_of
 from foosim.deployment.schema import Deployment
-from foosim.world.component_types.payloads import PayloadCodec, as_mapping, plain_type
+from foosim.world.component_types.payloads import plain_type
 from foosim.world.component_types.per_field import codec_of
 
 Kind = Literal["integer", "number", "text", "bytes", "boolean", "json"]
@@ -154,22 +154,24 @@ class _Decoded:
 
     def __init__(self, deployment: Deployment) -> None:
         self._deployment = deployment
-        self._codecs: dict[tuple[str, str], PayloadCodec | None] = {}
+        self._channels: dict[tuple[str, str], Channel] = {}
 
-    def codec(self, robot: str, channel: str) -> PayloadCodec | None:
-        """Return the codec of a robot's channel; None when it has no such one, or one of bytes."""
+    def channel(self, robot: str, channel: str) -> Channel:
+        """Return a robot's channel; one of bytes when it has no such one."""
         pair = robot, channel
-        if pair not in self._codecs:
+        if pair not in self._channels:
             try:
-                self._codecs[pair] = channel_codec(self._deployment, robot, channel)
+                self._channels |= channels_of(self._deployment, [pair])
             except UnknownName:
-                self._codecs[pair] = None
-        return self._codecs[pair]
+                self._channels[pair] = Channel(None, ())
+        return self._channels[pair]
 
-    def numbers(self, codec: PayloadCodec | None, payload: bytes) -> dict[str, Any]:
-        """Return the values of a payload by name; none for plain bytes and for an invalid payload."""
+    def numbers(self, channel: Channel, payload: bytes) -> dict[str, Any]:
+        """Return the values of a payload by name, those of joints by these; none for plain bytes and for an invalid
+        payload."""
+        codec, joints = channel
         try:
-            return {} if codec is None else as_mapping(codec.decode(payload))
+            return {} if codec is None else codec.named(codec.decode(payload), joints)
         except Malformed:
             return {}
 
@@ -182,8 +184,8 @@ class _PacketRows(_Decoded):
 
     def rows(self, decode: Decode, message: Message) -> Iterator[tuple[Any, ...]]:
         row = decode(self._decoder, message)
-        codec = self.codec(row.source, row.channel) or self.codec(row.destination, row.channel)
-        numbers = self.numbers(codec, row.payload)
+        sent, received = self.channel(row.source, row.channel), self.channel(row.destination, row.channel)
+        numbers = self.numbers(received if sent.codec is None else sent, row.payload)
         yield (*_values(row, self._json), encode_json(numbers).decode() if numbers else None)
 
 
@@ -228,7 +230,7 @@ class _Commands(_Decoded):
         row = decode(self._decoder, message)
         robot = self._deployment.robots.get(row.destination)
         if robot is not None and row.channel in robot.actuators:
-            values = self.numbers(self.codec(row.destination, row.channel), row.payload)
+            values = self.numbers(self.channel(row.destination, row.channel), row.payload)
             yield (*self._fields(row), *(_cell(column, values.get(name)) for name, column in self._columns.items()))
 
 

@@ -43,7 +43,7 @@ from foosim.client.playing import NS_PER_S, Newest
 from foosim.common import limits
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.common.names import is_name
-from foosim.deployment.channel_kinds import channel_codec
+from foosim.deployment.channel_kinds import channel_codec, channels_of
 from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.channels import VHUB, Plane
@@ -521,7 +521,7 @@ class Client:
         period, offset, arrivals = turns
         self._subscriptions.update(arrivals)
         pairs = sorted(self._subscriptions)
-        self._newest = Newest({pair: channel_codec(self.deployment, *pair) for pair in pairs})
+        self._newest = Newest(channels_of(self.deployment, pairs))
         self._core.join(period, pairs, offset, arrivals)
         self._period, self._turns = period, turns
         self._link.perform()

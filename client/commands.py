@@ -13,14 +13,15 @@ from msgspec import Struct, structs
 from foosim.client.player import Command
 from foosim.common.errors import ABSENT, BadValue, UnknownName
 from foosim.common.names import nearest_name
+from foosim.deployment.channel_kinds import joints_of
 from foosim.deployment.schema import Deployment
 from foosim.world.component_types.payloads import Field, PayloadCodec
 from foosim.world.component_types.per_field import codec_of
 
 
 class Taker(NamedTuple):
-    """What takes commands of a robot: its channel, how they are packed, and the joints that the deployment names where
-    a command is a number for each."""
+    """What takes commands of a robot: its channel, how they are packed, and the names of its joints where a command has
+    a number for each, or several rows of such numbers; none where a robot's file is missing."""
 
     robot: str
     channel: str
@@ -35,9 +36,14 @@ class Taker(NamedTuple):
     @property
     def takes(self) -> str:
         """What it takes, in words: its fields with their units."""
-        whose = f" of {', '.join(self.joints)}" if self.joints else ""
-        fields = [f"{field.name}{f' ({field.unit})' if field.unit else ''}{whose}" for field in self.fields]
+        fields = [
+            f"{field.name}{f' ({field.unit})' if field.unit else ''}{self._whose(field)}" for field in self.fields
+        ]
         return f"{self.robot}/{self.channel} takes {', '.join(fields)}"
+
+    def _whose(self, field: Field) -> str:
+        """Return the joints of a field with a number, or a row of numbers, for each."""
+        return f" of {', '.join(self.joints)}" if self.joints and self.codec.is_of_joints(field) else ""
 
     def wrong(self, what: str, value: object = ABSENT, nearest: str | None = None) -> BadValue:
         """Return the error of a command."""
@@ -55,7 +61,7 @@ class Taker(NamedTuple):
                 raise self.wrong(f"a {type(command).__name__} is not one of these")
             values = self._named(command) if isinstance(command, Mapping) else self._ordered(command)
             command = codec.kind(**values)
-        if self.joints:
+        if self.joints and _is_several(codec):
             self._check_length(getattr(command, codec.fields[0].name))
         return command
 
@@ -71,12 +77,23 @@ class Taker(NamedTuple):
     def _named(self, command: Mapping[Any, Any]) -> dict[str, Any]:
         """Return the values of fields, or of joints, by their names."""
         fields = [field.name for field in self.fields]
-        if self.joints and not any(name in fields for name in command):
-            self._check_names(command, self.joints, self.joints)
-            return {fields[0]: tuple(command[joint] for joint in self.joints)}
+        if self.joints and _is_several(self.codec) and not any(name in fields for name in command):
+            return {fields[0]: self._by_joint(command)}
         needed = [field.name for field in structs.fields(self.codec.kind) if field.required]
         self._check_names(command, fields, needed)
-        return dict(command)
+        found = dict(command)
+        for field in self.fields if self.joints else ():
+            numbers = found.get(field.name)
+            if isinstance(numbers, Mapping) and field.is_several and self.codec.is_packed:
+                found[field.name] = self._by_joint(numbers)
+            elif isinstance(numbers, list | tuple) and field.is_rows:
+                found[field.name] = [self._by_joint(row) if isinstance(row, Mapping) else row for row in numbers]
+        return found
+
+    def _by_joint(self, numbers: Mapping[Any, Any]) -> tuple[Any, ...]:
+        """Return numbers by the names of joints in the order of these."""
+        self._check_names(numbers, self.joints, self.joints)
+        return tuple([numbers[joint] for joint in self.joints])
 
     def _check_names(self, command: Mapping[Any, Any], valid: Sequence[str], needed: Sequence[str]) -> None:
         for name in command:
@@ -160,8 +177,8 @@ class CommandEncoder:
         takers = []
         for channel, its in sorted(self._deployment.robots[robot].actuators.items()):
             codec = codec_of(its.component_type)
-            named = its.component_type.joints_named(its) if _is_several(codec) else None
-            takers.append(Taker(robot, channel, codec, named or ()))
+            joints = joints_of(self._deployment, robot, channel) if any(map(codec.is_of_joints, codec.fields)) else ()
+            takers.append(Taker(robot, channel, codec, joints))
         return tuple(takers)
 
     def _takes(self, robot: str, command: Struct) -> bool:

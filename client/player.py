@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 from msgspec import Struct
 from mypy_extensions import mypyc_attr
 
+from foosim.common.errors import BadValue
 from foosim.world.component_types.payloads import Value
 
 if TYPE_CHECKING:
@@ -31,7 +32,10 @@ class Packet(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """One packet of an endpoint's channel: its value, and when it was sent and due (simulated ns)."""
+    """One packet of an endpoint's channel: its value, and when it was sent and due (simulated ns).
+
+    `joints` are the names of the joints that the numbers of a reading of joints are of, in their order.
+    """
 
     source: str
     channel: str
@@ -39,6 +43,17 @@ class Sample(NamedTuple):
     sent_ns: int
     due_ns: int
     value: Value
+    joints: tuple[str, ...] = ()
+
+    def by_joint(self, field: str) -> dict[str, float]:
+        """Return the numbers of a field of a reading of joints, as `positions`, by the names of the joints.
+
+        Raises BadValue for another reading or field.
+        """
+        numbers = getattr(self.value, field, None)
+        if not self.joints or not isinstance(numbers, tuple) or len(numbers) != len(self.joints):
+            raise BadValue(f"{self.source}/{self.channel} has no number for each joint in its field", field)
+        return dict(zip(self.joints, numbers, strict=True))
 
 
 Samples: TypeAlias = Mapping[tuple[str, str], Sample]

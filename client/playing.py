@@ -16,12 +16,11 @@ from foosim.client.loading import load_player
 from foosim.client.packets import check_packet
 from foosim.client.player import Packet, Player, Sample, Turn
 from foosim.common.errors import Malformed, Refused, UnknownName
-from foosim.deployment.channel_kinds import channel_codec
+from foosim.deployment.channel_kinds import Channel, channels_of
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema import Player as Declaration
 from foosim.protocol.messages import Received
 from foosim.world.component_types.failures import failure_of, place_of_code
-from foosim.world.component_types.payloads import PayloadCodec
 
 NS_PER_S: Final = 1_000_000_000
 
@@ -33,27 +32,27 @@ PlayerFactory = Callable[[Deployment, Mapping[str, Any]], Player]
 class Newest:
     """Keeps the newest sample of each channel by sending time; packets may arrive out of order."""
 
-    def __init__(self, codecs: Mapping[tuple[str, str], PayloadCodec | None]) -> None:
-        """`codecs` are those of each (endpoint, channel), None for bytes; packets of others are ignored."""
+    def __init__(self, channels: Mapping[tuple[str, str], Channel]) -> None:
+        """`channels` are by (endpoint, channel); packets of others are ignored."""
         self.samples: dict[tuple[str, str], Sample] = {}
         self.malformed = 0
         """Samples that did not fit their channel."""
-        self._codecs = codecs
+        self._channels = channels
 
     def take(self, packets: Iterable[Received]) -> None:
         """Take packets in order of arrival."""
         for packet in packets:
             pair = (packet.source, packet.channel)
             known = self.samples.get(pair)
-            if pair not in self._codecs or (known is not None and known.sequence >= packet.sequence):
+            if pair not in self._channels or (known is not None and known.sequence >= packet.sequence):
                 continue
-            codec = self._codecs[pair]
+            codec, joints = self._channels[pair]
             try:
                 value = packet.payload if codec is None else codec.decode(packet.payload)
             except Malformed:
                 self.malformed += 1
                 continue
-            self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
+            self.samples[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value, joints)
 
 
 class Acting:
@@ -78,7 +77,7 @@ class Acting:
         """The tick since which the player exists, and its robots that are absent, once it has acted."""
         self.player = self._make(tick)
         self._encoder = CommandEncoder(deployment)
-        self.newest = Newest({pair: channel_codec(deployment, *pair) for pair in self.hears})
+        self.newest = Newest(channels_of(deployment, self.hears))
 
     def exist(self, since: int, absent: Collection[str], tick: int) -> None:
         """Be the player that exists since a tick, before it acts at another one; these of its robots are `absent`.

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from foosim.client.player import Packet
 from foosim.common.errors import BadValue, UnknownName
+from foosim.deployment.channel_kinds import joints_of
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received
 from foosim.world.component_types.payloads import field_at
@@ -35,7 +36,10 @@ NO_BOUNDS: Final[Mapping[str, Bounds]] = {}
 
 
 class Column(NamedTuple):
-    """One number of a vector: its channel, field and unit, and the least and the greatest value."""
+    """One number of a vector: its channel, field and unit, and the least and the greatest value.
+
+    The field of a number of a joint is `FIELD.JOINT`.
+    """
 
     robot: str
     channel: str
@@ -64,7 +68,12 @@ def numbers_in(one: BoundSensor | BoundActuator) -> int:
 class _Table:
     """The columns of some channels, and where each channel's are."""
 
-    def __init__(self, fitted: Sequence[BoundSensor | BoundActuator], bounds: Mapping[str, Bounds] = NO_BOUNDS) -> None:
+    def __init__(
+        self,
+        deployment: Deployment,
+        fitted: Sequence[BoundSensor | BoundActuator],
+        bounds: Mapping[str, Bounds] = NO_BOUNDS,
+    ) -> None:
         for glob, (least, most) in bounds.items():
             if not least < most:
                 raise BadValue(f"bounds of {glob}: the first is below the second", str((least, most)))
@@ -73,15 +82,16 @@ class _Table:
         for one in fitted:
             made: Any = one.sensor if isinstance(one, BoundSensor) else one.actuator
             start, size = len(columns), numbers_in(one)
+            called = one.codec.number_names(size, joints_of(deployment, one.robot, one.channel))
             for place, bound in enumerate(bounds_of(made, one.codec.fields, size)):
-                (low, high), field = bound, field_at(one.codec.fields, size, place)
-                name = f"{one.robot}/{one.channel}.{field.name}"
+                (low, high), unit = bound, field_at(one.codec.fields, size, place).unit
+                name = f"{one.robot}/{one.channel}.{called[place]}"
                 for glob, (least, most) in bounds.items():
                     if fnmatchcase(name, glob):
                         if not max(low, least) < min(high, most):
                             raise BadValue(f"bounds of {glob}: {name} has {low:g} to {high:g}", str((least, most)))
                         low, high = max(low, least), min(high, most)
-                columns.append(Column(one.robot, one.channel, field.name, field.unit, low, high))
+                columns.append(Column(one.robot, one.channel, called[place], unit, low, high))
             self.parts.append(_Part((one.robot, one.channel), one, start, len(columns)))
         self.columns = tuple(columns)
         names = [f"{column.robot}/{column.channel}.{column.field}" for column in columns]
@@ -115,7 +125,7 @@ class ReadingVector:
             for one in sensors_of(deployment, layout, layout[name])
         }
         fitted = [sensors[pair] for pair in sorted(set(pairs)) if pair in sensors and numbers_in(sensors[pair])]
-        table = _Table(fitted)
+        table = _Table(deployment, fitted)
         self.pairs = tuple(part.pair for part in table.parts)
         self.left_out = tuple(sorted(set(pairs) - set(self.pairs)))
         aged = [Column(*pair, "age", "s", NEVER_S, inf) for pair in self.pairs] if ages else []
@@ -156,7 +166,9 @@ class CommandVector:
             for name in sorted(set(robots))
             for one in actuators_of(deployment, layout, layout[name])
         }
-        table = _Table([fitted[pair] for pair in chosen([*fitted], globs) if numbers_in(fitted[pair])], bounds)
+        table = _Table(
+            deployment, [fitted[pair] for pair in chosen([*fitted], globs) if numbers_in(fitted[pair])], bounds
+        )
         self.columns = table.columns
         self._cuts = [(*part.pair, 8 * part.start, 8 * part.stop) for part in table.parts]
         """The robot and channel of each packet, and its part of the vector's bytes."""

@@ -13,6 +13,8 @@ from foosim.common.units import Quantity
 
 Name = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
 RobotName = Annotated[str, StringConstraints(pattern=names.ROBOT_NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
+PartName = Annotated[str, StringConstraints(min_length=1, max_length=limits.PART_NAME_LENGTH_MAX)]
+"""The name of a link or a joint, as it is in a robot's file: any characters."""
 RATE_MIN: Final = "1 mHz"
 Rate = Annotated[Fraction, Quantity(units.RATE, RATE_MIN, "10 kHz")]
 Offset = Annotated[int, Quantity(units.TIME, "0 s", "1000 s")]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 from foosim.common.errors import UnknownName
 from foosim.common.names import CHANNEL_ECHO
 from foosim.deployment.schema import Deployment
@@ -24,3 +27,23 @@ def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> Payloa
     if channel in robot.actuators:
         return codec_of(robot.actuators[channel].component_type)
     raise UnknownName(f"{endpoint} has no such channel", channel, [*robot.sensors, CHANNEL_ECHO, *robot.actuators])
+
+
+def joints_of(deployment: Deployment, endpoint: str, channel: str) -> tuple[str, ...]:
+    """Return the names of the joints that the component of a channel selects, in the order of its numbers; none for any
+    other channel."""
+    robot = deployment.robots.get(endpoint)
+    its = None if robot is None else robot.sensors.get(channel) or robot.actuators.get(channel)
+    return () if its is None else tuple(its.component_type.joints_named(its) or ())
+
+
+class Channel(NamedTuple):
+    """The codec of a channel's payloads, None for bytes, and the joints that its numbers are of."""
+
+    codec: PayloadCodec | None
+    joints: tuple[str, ...]
+
+
+def channels_of(deployment: Deployment, pairs: Iterable[tuple[str, str]]) -> dict[tuple[str, str], Channel]:
+    """Return the channels of pairs of endpoint and channel. Raises UnknownName."""
+    return {pair: Channel(channel_codec(deployment, *pair), joints_of(deployment, *pair)) for pair in pairs}

@@ -217,7 +217,7 @@ def check_complete(text: Text, name: str, deployment: Deployment) -> None:
     `text` and `name` are what the deployment was loaded from. Raises DeploymentError.
     """
     ends = Names(deployment.endpoints())
-    for stage in stages(deployment, with_files=True):
+    for _, stage in stages(deployment, with_files=True):
         found = chain.from_iterable(check.find(deployment, ends) for check in stage)
         refuse_findings(text, name, list(islice(found, PROBLEMS_MAX + 1)))
 
@@ -270,8 +270,9 @@ def _examined(expanded: Expanded, places: Places) -> tuple[Deployment | None, li
     if deployment is None or within:
         return deployment, [*map(places.problem, within)]
     ends = Names(deployment.endpoints())
-    for stage in stages(deployment):
-        found = [(check, finding) for check in stage for finding in first(check.find(deployment, ends))]
+    for known, stage in stages(deployment):
+        deployment = known
+        found = [(check, finding) for check in stage for finding in first(check.find(known, ends))]
         if found:
             return None, [places.problem(finding, is_made=not check.of_entries) for check, finding in found]
     return deployment, []

@@ -22,6 +22,7 @@ from foosim.deployment.hosts import Host, Listen, Placed
 from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.rules import Network, Selector
 from foosim.deployment.network.traces import check_files, network_files
+from foosim.world.assembly.joint_selection import with_joint_names
 from foosim.world.scenery import mesh_files, read_contents
 from foosim.world.spec import WorldSpec
 
@@ -185,12 +186,17 @@ class Deployment(WorldSpec):
     deadlines: Deadlines = Field(default_factory=Deadlines)
 
     def with_assets(self, files: Mapping[str, bytes]) -> Self:
-        """The same with the contents of the files that scenery, robots and network name; raises AssetError."""
+        """The same with the contents of the files that scenery, robots and network name, and with the names of joints
+        in the settings that select some. Raises AssetError."""
         others = [*network_files(self.network), *self.robot_files(files)]
         deployment = self.with_contents(read_contents(self.scenery, files, others))
         check_files(self.network, files)
         self.check_robot_files(files)
-        return deployment
+        return deployment.with_joint_names()
+
+    def with_joint_names(self) -> Self:
+        """The same with the names of joints in the settings that select some; the files of robots must be there."""
+        return with_joint_names(self)
 
     def files(self) -> dict[str, str | None]:
         """The files that it names, by path, each with the digest that is written beside it."""

@@ -55,6 +55,7 @@ from foosim.world.component_types.settings import (
     RobotSettings,
     SensorSettings,
 )
+from foosim.world.components.joint_names import joint_indices
 from foosim.world.components.reach import REACHED
 from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.layout import (
@@ -642,7 +643,7 @@ def _rule_problems(rule: WorldRule) -> Iterator[str]:
 
 
 def _components(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield sensors and actuators whose slots or modifiers do not fit their settings, or that command the same motors.
+    """Yield sensors and actuators whose slots or modifiers do not fit their settings.
 
     What many robots share, by a template, is checked once.
     """
@@ -654,7 +655,6 @@ def _components(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                 if (id(model), id(settings)) not in met:
                     met.add((id(model), id(settings)))
                     yield from _unfit_component(settings, model, deployment, ("robots", name, section, channel))
-        yield from _competing(robot.actuators, ("robots", name, "actuators"))
 
 
 def _unfit_component(
@@ -679,41 +679,6 @@ def _unfit_component(
             yield Finding((*place, "kind"), what, modifier.kind)
         else:
             yield from _unfit_modifier(modifier, Carrier(numbers.size, period_ns), numbers, place)
-
-
-def _competing(actuators: Mapping[str, ActuatorSettings], location: Location) -> Iterator[Finding]:
-    """Yield the actuators that command motors which another one commands already."""
-    before: dict[str, Sequence[str] | None] = {}
-    for name, settings in actuators.items():
-        component = settings.component_type
-        if not component.moves:
-            continue
-        try:
-            named = component.joints_named(settings)
-        except BadValue as error:
-            yield Finding((*location, name, component.joints), error.problem, error.value)
-            continue
-        clashes = (_clash(named, other, theirs) for other, theirs in before.items())
-        found = next((clash for clash in clashes if clash is not None), None)
-        if found is not None:
-            place, what = found
-            path = ("kind",) if named is None else (component.joints, place)
-            yield Finding((*location, name, *path), what)
-        before[name] = named
-
-
-def _clash(named: Sequence[str] | None, other: str, theirs: Sequence[str] | None) -> tuple[int, str] | None:
-    """Return the index of a joint of an actuator that another one commands, and a description; None where there is
-    none. None for joints are all joints of the robot."""
-    if named is None:
-        what = "the motors that" if theirs is None else f"all joints, of which {theirs[0]} is one that"
-        return 0, f"commands {what} {other} commands already"
-    if theirs is None:
-        return 0, f"a joint that {other} commands already, with all others"
-    for place, joint in enumerate(named):
-        if joint in theirs:
-            return place, f"a joint that {other} commands already"
-    return None
 
 
 def _unfit_modifier(
@@ -852,7 +817,7 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
         (name, section, channel, settings)
         for name, robot in spec.robots.items()
         for section, channel, settings in _components_of(robot)
-        if overrides(settings.component_type.factory, "check")
+        if overrides(settings.component_type.factory, "check") or _selects(settings)
     ]
     layout = build_layout(spec) if checked else None
     for name, section, channel, settings in checked:
@@ -861,10 +826,50 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
         key = draw_key(spec.seed, component_type.type_name, name, channel)
         at = Mounting(spec, layout, layout[name], channel, key, is_owners=section == "sensors")
         try:
-            component_type.factory.check(settings, at)
+            if _selects(settings):
+                _check_joints(component_type, settings, at)
+            if overrides(component_type.factory, "check"):
+                component_type.factory.check(settings, at)
         except IncompatibleComponent as error:
             place: Location = ("robots", name, section, channel, *error.path)
             yield Finding(place, error.problem, error.value, error.nearest)
+
+
+def _selects(settings: ComponentSettings) -> bool:
+    """Whether a component has a setting that selects joints of its robot."""
+    return bool(getattr(settings.component_type, "joints", ""))
+
+
+def _check_joints(component: Component, settings: ComponentSettings, at: Mounting) -> None:
+    """Raise IncompatibleComponent for a setting that selects no joints of a robot."""
+    from foosim.world.components.mounted import body_at  # brings numpy
+
+    try:
+        named = component.joints_named(settings)
+    except BadValue as error:
+        raise IncompatibleComponent((component.joints,), error.problem, error.value) from None
+    joint_indices(body_at(at), named, component.joints, has_motors=component.type_name == "actuator")
+
+
+def _competing(spec: Deployment, ends: Names) -> Iterator[Finding]:
+    """Yield the actuators that command motors which another one of their robot commands already."""
+    for name, robot in spec.robots.items():
+        before: dict[str, Sequence[str] | None] = {}
+        for channel, settings in robot.actuators.items():
+            component = settings.component_type
+            if not component.moves:
+                continue
+            named = component.joints_named(settings)
+            for other, theirs in before.items():
+                location: Location = ("robots", name, "actuators", channel)
+                joint = next((one for one in named or () if theirs is None or one in theirs), None)
+                if joint is not None:
+                    yield Finding((*location, component.joints), f"a joint that {other} commands already", joint)
+                    break
+                if named is None:
+                    yield Finding((*location, "kind"), f"commands all motors, of which {other} commands some already")
+                    break
+            before[channel] = named
 
 
 # --- engines ----------------------------------------------------------------------------------------------------------
@@ -951,6 +956,7 @@ STATE: Final = (
     (Check("triggers of sensors", _unheard),),
     (Check("trial of other packages' components", _trial),),
     (Check("start and events", _start), Check("components on their robots", _unfit_components)),
+    (Check("joints that actuators share", _competing),),
 )
 """Of the state of a world, whose robots' files must be there."""
 WHOLE: Final = (
@@ -962,12 +968,18 @@ WHOLE: Final = (
 FILES: Final = ((Check("walls of meshes", _open_meshes),), (Check("what models and components need", needs),))
 
 
-def stages(deployment: Deployment, *, with_files: bool = False) -> Iterator[tuple[Check, ...]]:
+def stages(deployment: Deployment, *, with_files: bool = False) -> Iterator[tuple[Deployment, tuple[Check, ...]]]:
     """Yield the checks of a deployment by stages; each rests on those before, and is for one without problems in them.
+    Beside them is the deployment to check: once its robots are known, with the names of their joints.
 
     `with_files`: only the checks that need the contents of files, for a deployment that was loaded without problems.
     """
     if with_files:
-        yield from (*FILES, *(STATE if deployment.asset_files else ()))
-    else:
-        yield from (BETWEEN, COMPONENTS, *(() if deployment.lacks_files else STATE), WHOLE)
+        yield from ((deployment, stage) for stage in (*FILES, *(STATE if deployment.asset_files else ())))
+        return
+    yield deployment, BETWEEN
+    yield deployment, COMPONENTS
+    if not deployment.lacks_files:
+        deployment = deployment.with_joint_names()
+        yield from ((deployment, stage) for stage in STATE)
+    yield deployment, WHOLE

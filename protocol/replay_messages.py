@@ -16,7 +16,7 @@ from foosim.common.struct_types import Counter, Item, Message, Name, Numbers, Pa
 PACKETS, POSES, SCENE, LOG, ROWS, CLOCK = "packets", "poses", "scene", "log", "rows", "clock"
 STREAMS: Final = (PACKETS, POSES, SCENE, LOG, ROWS, CLOCK)
 """The streams: the last part of a message's key."""
-LinkName = Annotated[str, Meta(min_length=1, max_length=2 * limits.NAME_LENGTH_MAX + 1)]
+LinkName = Annotated[str, Meta(min_length=1, max_length=limits.NAME_LENGTH_MAX + 1 + limits.PART_NAME_LENGTH_MAX)]
 """A body and its link, as `red.attack/slide`."""
 
 

@@ -8,7 +8,7 @@ from typing import Final
 from foosim.client.player import Packet
 from foosim.client.playing import Acting
 from foosim.common.errors import Malformed, UnknownName
-from foosim.deployment.channel_kinds import channel_codec
+from foosim.deployment.channel_kinds import channels_of
 from foosim.deployment.schema import Deployment
 from foosim.protocol.messages import Received, Sent
 from foosim.simulation.carriers import Carrier
@@ -48,8 +48,8 @@ class Agent:
         """The tick since which it exists; -1 while all its robots are absent."""
         self.malformed = 0
         """Readings since the last `reset` that do not fit their channel: the network has changed them."""
-        self.codecs = {pair: channel_codec(deployment, *pair) for pair in self.hears}
-        """What carries each (endpoint, channel) that it hears; None for bytes."""
+        self.channels = channels_of(deployment, self.hears)
+        """By each (endpoint, channel) that it hears."""
         self.newest: dict[Pair, Received] = {}
 
     def begin(self) -> None:
@@ -77,9 +77,9 @@ class Agent:
         for packet in packets:
             pair = packet.source, packet.channel
             known = newest.get(pair)
-            if pair not in self.codecs or (known is not None and known.sequence >= packet.sequence):
+            if pair not in self.channels or (known is not None and known.sequence >= packet.sequence):
                 continue
-            codec = self.codecs[pair]
+            codec = self.channels[pair].codec
             if is_checked and codec is not None:
                 try:
                     codec.decode(packet.payload)

@@ -177,9 +177,9 @@ class Simulation:
         found: dict[Pair, Sample] = {}
         for agent in self.agents.values():
             for pair, packet in agent.newest.items():
-                codec = agent.codecs[pair]
+                codec, joints = agent.channels[pair]
                 value = packet.payload if codec is None else codec.decode(packet.payload)
-                found[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value)
+                found[pair] = Sample(*pair, packet.sequence, packet.sent_ns, packet.due_ns, value, joints)
         return dict(sorted(found.items()))
 
     @property

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-from pydantic import StringConstraints
-
 from foosim.common import units
 from foosim.common.errors import BadValue
-from foosim.common.spec_base import SpecBase, default
+from foosim.common.spec_base import PartName, SpecBase, default
 from foosim.common.units import Quantity
 from foosim.world.scene import Quaternion, Vector, from_rpy
 
-LinkName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=64)]
 FAR_M: Final = 100_000.0
 """The greatest distance of a place from the origin, in each coordinate (m)."""
 Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
@@ -43,7 +40,7 @@ class At(SpecBase):
 class MountedAt(At):
     """A pose in the frame of a link of the robot: the one of this name, the first one without a name."""
 
-    link: LinkName | None = None
+    link: PartName | None = None
 
 
 def is_placed(settings: type[SpecBase]) -> bool:

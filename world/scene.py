@@ -108,7 +108,7 @@ class Link:
     `inertia` is the diagonal about the centre of mass, in the principal axes, whose orientation in the link's frame is
     `principal`. A motor of the joint has at most the force `effort` (N or N m) and the speed `speed` (m/s or rad/s);
     `damping` is the resistance to its speed (N s/m or N m s/rad). `joint_name` is what the joint is called; empty, it
-    is called as the link. With a `mimic` the joint has no motor of its own.
+    is called as the link (`Body.joint_names`). With a `mimic` the joint has no motor of its own.
 
     `visuals` is what the link looks like, with meshes of any form; where there are none it looks like its `shapes`.
     """
@@ -176,6 +176,17 @@ class Body:
     def joints(self) -> tuple[Link, ...]:
         """The links whose joints move, in their order."""
         return tuple([link for link in self.links if link.joint in MOVING])
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """What the links are called: their names without that of the body, which may hold any characters."""
+        return tuple([link.name.removeprefix(f"{self.name}/") for link in self.links])
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """What the joints that move are called, in their order."""
+        names = zip(self.links, self.link_names, strict=True)
+        return tuple([link.joint_name or name for link, name in names if link.joint in MOVING])
 
 
 @dataclass(frozen=True, slots=True)

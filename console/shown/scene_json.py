@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from foosim.client.commands import CommandEncoder
+from foosim.deployment.channel_kinds import joints_of
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import mark_kinds
 from foosim.world.component_types.payloads import PayloadCodec
@@ -25,12 +26,15 @@ UNITS: Final[Mapping[str, tuple[str, ...]]] = {
     "orientation": ("",),
     "linear_velocity": ("m/s",),
     "angular_velocity": ("rad/s",),
-    "joint_positions": ("m", "rad"),
-    "joint_velocities": ("m/s", "rad/s"),
-    "joint_efforts": ("N", "N m"),
     "contacts": ("", "N s", ""),
 }
 """Of the numbers of fields that every model calls the same; the last one is that of all after it."""
+JOINT_UNITS: Final[Mapping[str, tuple[str, str]]] = {
+    "joint_positions": ("m", "rad"),
+    "joint_velocities": ("m/s", "rad/s"),
+    "joint_efforts": ("N", "N m"),
+}
+"""Of the numbers of joints that slide, and of joints that turn."""
 NO_UNIT: Final = ("",)
 TICKS: Final = ("_ticks", ("ticks",))
 """How a field of a rule's memory is called that counts ticks, and its unit."""
@@ -117,13 +121,19 @@ def _mesh(mesh: Mesh) -> dict[str, str]:
 
 
 def _fields(deployment: Deployment, layout: Layout, scene: Scene) -> list[dict[str, Any]]:
-    """Return the runs of numbers of a frame: those of one unit, by their first index."""
+    """Return the runs of numbers of a frame: those of one unit, by their first index; each joint's number by itself."""
     fields = []
     for entity in layout.entities:
         body = scene.bodies.get(entity.name)
         names = {} if body is None or not body.is_free or body.links[0].is_centred else CENTRE_OF_SLOT
         commanded = {f"{channel}.set_point": codec for channel, codec in _actuators(deployment, entity.name)}
         for name, start in entity.offsets.items():
+            if body is not None and name in JOINT_UNITS:
+                for place, (joint, link) in enumerate(zip(body.joint_names, body.joints, strict=True)):
+                    unit = JOINT_UNITS[name][link.joint != "prismatic"]
+                    run = {"entity": entity.name, "field": name, "name": joint}
+                    fields.append({**run, "unit": unit, "index": start + place, "count": 1})
+                continue
             codec = commanded.get(name)
             units = _units(entity, name) if codec is None else tuple(field.unit for field in codec.fields)
             for place, count in _runs(entity.counts[name], len(units)):
@@ -158,15 +168,24 @@ def _commands(deployment: Deployment, layout: Layout) -> list[dict[str, Any]]:
         {
             "robot": entity.name,
             "channel": channel,
-            "number": field.name,
-            "unit": field.unit,
+            "number": number,
+            "unit": unit,
             "index": entity.offsets[f"{channel}.set_point"] + place,
         }
         for entity in layout.robots
         for channel, codec in _actuators(deployment, entity.name)
         if f"{channel}.set_point" in entity.offsets
-        for place, field in enumerate(codec.fields[: entity.counts[f"{channel}.set_point"]])
+        for place, (number, unit) in enumerate(_numbers(deployment, entity, channel, codec))
     ]
+
+
+def _numbers(deployment: Deployment, entity: Entity, channel: str, codec: PayloadCodec) -> list[tuple[str, str]]:
+    """Return what the numbers of a set-point are called, with their units: by joint where there is one for each."""
+    count, joints = entity.counts[f"{channel}.set_point"], joints_of(deployment, entity.name, channel)
+    if len(joints) == count and any(map(codec.is_of_joints, codec.fields)):
+        unit = next(field.unit for field in codec.fields if codec.is_of_joints(field))
+        return [(joint, unit) for joint in joints]
+    return [(field.name, field.unit) for field in codec.fields[:count]]
 
 
 def _runs(count: int, units: int) -> list[tuple[int, int]]:
@@ -175,12 +194,17 @@ def _runs(count: int, units: int) -> list[tuple[int, int]]:
     return [*runs, (len(runs), count - len(runs))]
 
 
-def _sensors(deployment: Deployment) -> list[dict[str, str]]:
-    return [
-        {"robot": name, "channel": channel, "kind": sensor.kind, "unit": codec_of(sensor.component_type).unit}
-        for name, robot in sorted(deployment.robots.items())
-        for channel, sensor in sorted(robot.sensors.items())
-    ]
+def _sensors(deployment: Deployment) -> list[dict[str, Any]]:
+    """Return the sensors; those of joints with what the numbers of a reading are called, and their units."""
+    found = []
+    for name, robot in sorted(deployment.robots.items()):
+        for channel, sensor in sorted(robot.sensors.items()):
+            codec, joints = codec_of(sensor.component_type), joints_of(deployment, name, channel)
+            units = [field.unit for field in codec.fields for _ in (joints if codec.is_of_joints(field) else (0,))]
+            numbers = [*zip(codec.number_names(len(units), joints), units, strict=True)] if joints else []
+            about = {"robot": name, "channel": channel, "kind": sensor.kind, "unit": codec.unit}
+            found.append({**about, "numbers": numbers})
+    return found
 
 
 def standing_bounds(scene: Scene) -> tuple[Vector, Vector]:

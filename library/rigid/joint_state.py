@@ -8,12 +8,12 @@ from typing import Annotated, ClassVar, Final
 from msgspec import Meta, Struct
 from pydantic import Field
 
-from foosim.common.spec_base import Name
 from foosim.world.component_types.descriptions import JOINTS
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
-from foosim.world.components.mounted import joint_indices
+from foosim.world.components.joint_names import JointNames, joint_indices
+from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, SlotReadings, View
 
 JOINTS_MAX: Final = 256
@@ -21,12 +21,12 @@ Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_MAX)
 
 
 class JointStateSettings(SensorSettings):
-    """Positions, velocities and efforts of `joints`, by the names of the links that hang on them, in this order.
+    """Positions, velocities and efforts of joints.
 
-    Where none is named they are those of all joints that move, in the order of their links.
+    `joints` selects them by names or by patterns of these with `*`, in this order; without it they are all that move.
     """
 
-    joints: list[Name] = Field(default=[], max_length=JOINTS_MAX)
+    joints: Annotated[JointNames, Field(min_length=1, max_length=JOINTS_MAX)] | None = None
 
 
 class JointState(Struct, frozen=True):
@@ -42,23 +42,16 @@ class JointState(Struct, frozen=True):
 
 def joints_of(settings: JointStateSettings, counts: Mapping[str, int]) -> int:
     """Return the count of measured joints; `counts` are the sizes of the robot's fields."""
-    return len(settings.joints) or counts["joint_positions"]
+    return len(settings.joints or ()) or counts["joint_positions"]
 
 
-@sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, array_length=joints_of)
+@sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, array_length=joints_of, joints="joints")
 class JointStates(Sensor):
     """Positions, velocities and efforts of joints."""
 
     def __init__(self, settings: JointStateSettings, at: Mounting) -> None:
-        slots = [at.slot(field) for field in JOINTS]
-        chosen = joint_indices(at, settings.joints) if settings.joints else range(slots[0].size)
-        self.places = [slot.at + joint for slot in slots for joint in chosen]
-
-    @staticmethod
-    def check(settings: JointStateSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a joint that the robot does not have, or that is named twice."""
-        if settings.joints:
-            joint_indices(at, settings.joints)
+        joints = joint_indices(body_at(at), settings.joints, has_motors=False)
+        self.places = [at.slot(field).at + joint for field in JOINTS for joint in joints]
 
     def sample(self, view: View) -> JointState:
         numbers = [view.numbers[place] for place in self.places]

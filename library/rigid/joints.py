@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from msgspec import Meta
 from pydantic import Field
 
 from foosim.common import units
 from foosim.common.errors import BadValue
-from foosim.common.spec_base import Name, default
+from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.world.component_types.descriptions import JOINTS_MAX, Carrier
 from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.entities import Motors
-from foosim.world.components.mounted import body_at, joint_indices
+from foosim.world.components.joint_names import JointNames, joint_indices
+from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.scene import Link
 
@@ -35,9 +36,13 @@ Efforts = Annotated[tuple[Annotated[float, Meta(extra={"unit": "N or N m"})], ..
 
 
 class JointSettings(ActuatorSettings):
-    """Drives the named joints of a robot, in this order; all, in the order of its links, where none are named."""
+    """Drives joints of a robot.
 
-    joints: Annotated[list[Name], Field(min_length=1, max_length=JOINTS_MAX)] | None = None
+    `joints` selects them by names or by patterns of these with `*`, in this order; without it they are all that have a
+    motor of their own.
+    """
+
+    joints: Annotated[JointNames, Field(min_length=1, max_length=JOINTS_MAX)] | None = None
 
 
 class JointLoopSettings(JointSettings):
@@ -59,23 +64,17 @@ def checked_joint_count(settings: JointSettings, carrier: Carrier) -> int:
         raise BadValue(f"a gain that overshoots: at most the inverse of a tick, {most:g} Hz, is stable", settings.gain)
     if carrier.joints == 0:
         raise BadValue("the robot has no joints", settings.kind)
-    if settings.joints is None:
-        return carrier.joints
-    if len(settings.joints) > carrier.joints or len(set(settings.joints)) < len(settings.joints):
-        raise BadValue(f"{carrier.joints} joints, each once, are valid", settings.joints)
-    return len(settings.joints)
+    return carrier.joints if settings.joints is None else len(settings.joints)
 
 
 class JointGroup:
     """The joints that an actuator drives, in the frames of one layout."""
 
     def __init__(self, settings: JointSettings, at: Mounting) -> None:
-        """Raises IncompatibleComponent for a joint that the robot does not have."""
+        """Raises IncompatibleComponent for joints that the robot does not have, or that follow others."""
         body = body_at(at)
-        everything = range(len(body.joints))
-        self.indices = tuple(everything) if settings.joints is None else joint_indices(at, settings.joints)
-        links = [body.joints[index].name.removeprefix(f"{body.name}/") for index in self.indices]
-        self.names = tuple(f"joint of {link}" for link in links)
+        self.indices = joint_indices(body, settings.joints, has_motors=True)
+        self.names = tuple([body.joint_names[index] for index in self.indices])
         """What the numbers of a command are of."""
         self.links: tuple[Link, ...] = tuple(body.joints[index] for index in self.indices)
         start = at.robot.offsets["joint_positions"]
@@ -104,13 +103,8 @@ class JointActuator(Actuator):
     def __init__(self, settings: JointSettings, at: Mounting) -> None:
         self.group = JointGroup(settings, at)
 
-    @staticmethod
-    def check(settings: Any, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a joint that the robot does not have."""
-        JointGroup(settings, at)
-
     def names(self) -> tuple[str, ...]:
-        """Return the names of the numbers of a command: the links on the joints."""
+        """Return the names of the numbers of a command: those of the joints."""
         return self.group.names
 
     def hold(self, view: WritableView) -> None:

@@ -39,12 +39,11 @@ def pan_tilt_of(settings: PanTiltSettings, at: Mounting) -> JointGroup:
     """Return the two joints. Raises IncompatibleComponent for others."""
     group, body = JointGroup(settings, at), body_at(at)
     path = "kind" if settings.joints is None else "joints"
-    names = [link.name.removeprefix(f"{body.name}/") for link in group.links]
     if [link.joint in ("revolute", "continuous") for link in group.links] != [True, True]:
-        raise IncompatibleComponent((path,), "two joints that turn are valid, pan and tilt", names)
+        raise IncompatibleComponent((path,), "two joints that turn are valid, pan and tilt", [*group.names])
     pan, tilt = (body.links.index(link) for link in group.links)
     if not hangs_on(body, tilt, pan):
-        raise IncompatibleComponent((path,), "the second joint must be on the first: pan, then tilt", names)
+        raise IncompatibleComponent((path,), "the second joint must be on the first: pan, then tilt", [*group.names])
     return group
 
 

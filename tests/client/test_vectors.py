@@ -78,7 +78,10 @@ def test_everything_may_be_nothing() -> None:
 def test_commands_of_joints_have_a_column_for_each_with_its_own_limits() -> None:
     deployment = read_for_stepping(TABLE.with_name("yard.yaml"))
     vector = CommandVector(deployment, ["arm"])
-    assert {(one.channel, one.field) for one in vector.columns} == {("joints", "positions")}
+    assert {one.channel for one in vector.columns} == {"joints"}
+    assert [one.field for one in vector.columns][2:5] == [
+        *("positions.upper_arm_roll", "positions.elbow_pitch", "positions.forearm_roll")
+    ]
     assert len({(one.low, one.high) for one in vector.columns}) > 1
     middle = np.array([(one.low + one.high) / 2 if one.low > -inf else 0.0 for one in vector.columns])
     (packet,) = vector.packets(middle)

@@ -142,11 +142,13 @@ def test_joints_follow_their_ways_and_the_job_is_done_at_the_end(its: Simulation
 
 
 def test_an_arm_follows_within_a_milliradian() -> None:
-    """Its flange, which weighs nearly nothing, is another actuator's."""
-    links = ["shoulder", "upper_arm", "elbow", "forearm", "wrist", "hand"]
-    go = {"kind": "joint_trajectory", "joints": links}
+    """Its last joint, whose flange weighs nearly nothing, is another actuator's."""
+    go = {
+        "kind": "joint_trajectory",
+        "joints": ["shoulder_*", "upper_arm_roll", "elbow_pitch", "forearm_roll", "wrist_pitch"],
+    }
     arm = {"model": "urdf", "file": "arm.urdf", "fixed": True}
-    arm["actuators"] = {"go": go, "rest": {"kind": "joint_position", "joints": ["flange"]}}
+    arm["actuators"] = {"go": go, "rest": {"kind": "joint_position", "joints": ["wrist_roll"]}}
     times, rows = (1.0, 2.0), ((0.6, 0.4, -0.5, 0.9, 0.3, -0.4), (-0.2, 0.5, 0.5, -0.3, 0.0, 0.7))
     with Simulation(deployment({"arm": arm}, DEPLOY), agents=["ann"]) as its:
         assert tell(its, "arm", value("joint_trajectory", times, rows, 1.0), 1) == JobState.RUNNING
@@ -182,7 +184,7 @@ def test_an_arm_follows_within_a_milliradian() -> None:
             ((0.1, 0.1),) * 4,
             "4 times and positions at 4: as many are valid, 1 to 3",
         ),
-        (TrajectoryFailure.LIMITS, (9.0,), ((0.1, 1.3),), "joint of skull to 1.3, beyond its limits -1.2 to 1.2"),
+        (TrajectoryFailure.LIMITS, (9.0,), ((0.1, 1.3),), "tilt to 1.3, beyond its limits -1.2 to 1.2"),
         (TrajectoryFailure.SPEED, (0.5,), ((1.5, 0.0),), ""),
         (TrajectoryFailure.SPEED, (1.0, 1.2), ((0.0, 0.0), (0.0, 0.6)), ""),
     ],
@@ -297,8 +299,8 @@ def test_what_an_eye_cannot_see_fails_its_job(its: Simulation) -> None:
 @pytest.mark.parametrize(
     ("kind", "about", "why"),
     [
-        ("pan_tilt", {"joints": ["skull", "neck"]}, "the second joint must be on the first: pan, then tilt"),
-        ("pan_tilt", {"joints": ["neck"]}, "two joints that turn are valid, pan and tilt"),
+        ("pan_tilt", {"joints": ["tilt", "pan"]}, "the second joint must be on the first: pan, then tilt"),
+        ("pan_tilt", {"joints": "pan"}, "two joints that turn are valid, pan and tilt"),
         ("look_at", {"at": {"link": "neck"}}, "its joints do not turn this link"),
         ("look_at", {"at": {"link": "ear"}}, "head has no such link; there are foot, neck, skull, eye"),
         ("joint_trajectory", {"gain": "200 Hz"}, "a gain that overshoots"),

@@ -350,8 +350,8 @@ def test_actuators_of_disjoint_joints_share_a_robot(kind: str, tmp_path: Path, m
     (tmp_path / "own_spin.py").write_text(OWN_SPIN)
     monkeypatch.syspath_prepend(str(tmp_path))
     actuators = {
-        "arm": {"kind": "joint_position", "joints": ["reach"]},
-        "wheels": {"kind": kind, "joints": ["right", "left"]},
+        "arm": {"kind": "joint_position", "joints": "*_reach"},
+        "wheels": {"kind": kind, "joints": ["to_right", "to_l*"]},
     }
     cart = {"model": "urdf", "file": "cart.urdf", "fixed": True, "at": {"z": "1 m"}, "actuators": actuators}
     files = {"cart.urdf": f'<robot name="cart"><link name="foot"/>{PARTS}</robot>'.encode()}

@@ -111,15 +111,17 @@ THREE: Final = (
 
 
 CLASHES: Final[dict[str, tuple[Any, Any, str]]] = {
-    "both name it": (["upper", "fore"], ["hand", "fore"], "arm.joints[1]: a joint that base commands already, 'fore'"),
-    "one commands all": (None, ["hand"], "arm.joints[0]: a joint that base commands already, with all others, 'hand'"),
-    "the other one does": (
-        ["hand"],
-        None,
-        "arm.kind: commands all joints, of which hand is one that base commands already, 'joint_position'",
+    "both name it": (
+        ["to_upper", "to_fore"],
+        ["to_hand", "to_fore"],
+        "arm.joints: a joint that base commands already, 'to_fore'",
     ),
-    "both do": (None, None, "arm.kind: commands the motors that base commands already, 'joint_position'"),
-    "no one does": (["upper", "hand"], ["fore"], ""),
+    "one commands all": (None, ["to_hand"], "arm.joints: a joint that base commands already, 'to_hand'"),
+    "the other one does": (["to_hand"], None, "arm.joints: a joint that base commands already, 'to_hand'"),
+    "both do": (None, None, "arm.joints: a joint that base commands already, 'to_upper'"),
+    "patterns do": ("to_?[op]*", ["to_hand", "*r"], "arm.joints: a joint that base commands already, 'to_upper'"),
+    "no one does": (["to_upper", "to_hand"], ["to_fore"], ""),
+    "nor do patterns": ("*_[uh]*", "to_f*", ""),
 }
 
 

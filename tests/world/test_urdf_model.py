@@ -203,7 +203,7 @@ def test_a_joint_starts_at_its_limit_where_0_is_none(folder: Path) -> None:
     ("robot", "field", "place", "value", "problem"),
     [
         ("arm", "joint_positions", 0, 2.99, ""),
-        ("arm", "joint_positions", 0, 3.01, "its joint shoulder is at 3.01, -3 to 3 is valid"),
+        ("arm", "joint_positions", 0, 3.01, "its joint shoulder_yaw is at 3.01, -3 to 3 is valid"),
         ("arm", "joint_positions", 3, -2.35, ""),
         ("arm", "joint_velocities", 6, -360.5, ""),
         ("cart", "joint_positions", 0, 500.0, ""),

@@ -87,8 +87,8 @@ def speed_of(entity: Entity, radius: float, numbers: Sequence[float]) -> float:
 
 def _limits_of(body: Body) -> _Limits:
     joints = []
-    for link in body.joints:
+    for name, link in zip(body.joint_names, body.joints, strict=True):
         depth = STOP_DEPTH_M if link.joint == "prismatic" else STOP_DEPTH_RAD
         low, high = (-inf, inf) if link.joint == "continuous" else link.limits
-        joints.append((link.name.rpartition("/")[2], low - depth, high + depth))
+        joints.append((name, low - depth, high + depth))
     return _Limits(body.speed_limit, radius_of(body) if body.is_free else 0.0, tuple(joints))

@@ -32,12 +32,14 @@ Value: TypeAlias = Struct | bytes
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a reading or command: its name and unit; whether it is one number, several, or something else."""
+    """A field of a reading or command: its name and unit; whether it is one number, several, rows of several, or
+    something else."""
 
     name: str
     unit: str
     is_number: bool
     is_several: bool = False
+    is_rows: bool = False
 
 
 class PayloadCodec:
@@ -75,6 +77,29 @@ class PayloadCodec:
     def unit(self) -> str:
         """The units of its fields, each once."""
         return ", ".join(dict.fromkeys(field.unit for field in self.fields if field.unit))
+
+    def is_of_joints(self, field: Field) -> bool:
+        """Whether a field of a component that selects joints has a number for each of them, or rows of such numbers."""
+        return field.is_several if self.is_packed else field.is_rows
+
+    def named(self, value: Any, joints: Sequence[str]) -> dict[str, Any]:
+        """Return a value's fields by name; in fields with a number for each joint, the numbers by the joints' names."""
+        found = as_mapping(value)
+        for field in self.fields if joints else ():
+            numbers = found[field.name]
+            if self.is_of_joints(field):
+                rows = [dict(zip(joints, row, strict=False)) for row in (numbers if field.is_rows else [numbers])]
+                found[field.name] = rows if field.is_rows else rows[0]
+        return found
+
+    def number_names(self, size: int, joints: Sequence[str]) -> list[str]:
+        """Return what each of a value's `size` numbers is called: its field, and its joint as in `positions.elbow`."""
+        single, names = len(self.fields) - self._many, []
+        for place in range(size):
+            field = field_at(self.fields, size, place)
+            is_named = joints and self.is_of_joints(field)
+            names.append(f"{field.name}.{joints[(place - single) % len(joints)]}" if is_named else field.name)
+        return names
 
     def decode(self, payload: bytes) -> Any:
         """Return the value in a payload; raises Malformed for an invalid one, or one with a non-finite number."""
@@ -261,7 +286,7 @@ def _field(field: inspect.Field) -> Field:
     if isinstance(found, inspect.Metadata):
         unit = str((found.extra or {}).get("unit", ""))
     is_number = isinstance(plain_type(found), inspect.FloatType)
-    return Field(field.name, unit, is_number and depth == 0, is_number and depth == 1)
+    return Field(field.name, unit, *(is_number and depth == levels for levels in range(3)))
 
 
 def _bounds(kind: inspect.Type) -> tuple[int, int]:

@@ -17,7 +17,8 @@ from foosim.world.component_types.settings import ActuatorSettings, ComponentSet
 from foosim.world.components.base import Actuator, Modifier, Sensor
 from foosim.world.components.bounds import NO_LIMITS, Clamped, CommandBounds, limits_of
 from foosim.world.components.job_book import JobBook
-from foosim.world.components.mounted import joint_indices
+from foosim.world.components.joint_names import joint_indices
+from foosim.world.components.mounted import body_at
 from foosim.world.components.view import (
     ComponentError,
     ModifierMounting,
@@ -290,9 +291,13 @@ def actuators_of(spec: WorldSpec, layout: Layout, robot: Entity) -> tuple[BoundA
 
 
 def _joints(component: Component, settings: ActuatorSettings, mounting: Mounting) -> tuple[int, ...] | None:
-    """Return the joints that an actuator's settings name; None where they name none. Raises IncompatibleComponent."""
-    named = component.joints_named(settings)
-    return None if named is None else joint_indices(mounting, named, component.joints)
+    """Return the joints that an actuator's settings select; None for all in their order. Raises
+    IncompatibleComponent."""
+    if not component.joints:
+        return None
+    body = body_at(mounting)
+    joints = joint_indices(body, component.joints_named(settings), component.joints, has_motors=True)
+    return None if joints == tuple(range(len(body.joints))) else joints
 
 
 def _made(component: Component, settings: ComponentSettings, mounting: Mounting | ModifierMounting) -> Any:

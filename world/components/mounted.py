@@ -25,20 +25,6 @@ OF_TWIST = ("linear_velocity", "angular_velocity")
 """Fields of a free body with the motion of its places."""
 
 
-def joint_indices(at: Mounting, named: Sequence[str], setting: str = "joints") -> tuple[int, ...]:
-    """Return the numbers of the joints of a robot that a setting of a component names. Raises IncompatibleComponent for
-    one that the robot does not have, or that is named twice."""
-    body = body_at(at)
-    names = [link.name.removeprefix(f"{body.name}/") for link in body.joints]
-    for place, name in enumerate(named):
-        if name not in names:
-            what = f"{at.robot.name} has no such joint; there are {', '.join(names)}"
-            raise IncompatibleComponent((setting, place), what, name, nearest_quoted(name, names))
-        if name in named[:place]:
-            raise IncompatibleComponent((setting, place), "named twice", name)
-    return tuple([names.index(name) for name in named])
-
-
 class Mounted:
     """A place on a robot. What it keeps follows from deployment and layout."""
 
@@ -132,9 +118,9 @@ def link_index(body: Body, name: str | None) -> int:
     """Return the index of a body's link: its name is with or without that of the body. Raises IncompatibleComponent."""
     if name is None:
         return 0
-    names = [link.name.removeprefix(f"{body.name}/") for link in body.links]
-    name = name.removeprefix(f"{body.name}/")
-    if name not in names:
+    names = body.link_names
+    short = name if name in names else name.removeprefix(f"{body.name}/")
+    if short not in names:
         what = f"{body.name} has no such link; there are {', '.join(names)}"
         raise IncompatibleComponent(("at", "link"), what, name, nearest_quoted(name, names))
-    return names.index(name)
+    return names.index(short)

@@ -42,14 +42,21 @@ function commandsOf(commands) {
 function numbersOf(runs) {
   /** @type {Map<string, {field: string, numbers: {index: number, unit: string}[]}>} */
   const fields = new Map();
-  for (const { entity, field, unit, index, count } of runs) {
+  /** @type {Choice[]} */
+  const named = [];
+  for (const { entity, field, name: number, unit, index, count } of runs) {
+    if (number !== undefined) {
+      named.push({ name: `${entity} ${field}.${number}`, unit, request: { field: index } });
+      continue;
+    }
     const name = `${entity} ${field}`;
     const found = fields.get(name) ?? { field, numbers: [] };
     fields.set(name, found);
     for (let place = 0; place < count; place += 1) found.numbers.push({ index: index + place, unit });
   }
-  return [...fields].flatMap(([name, { field, numbers }]) =>
+  const others = [...fields].flatMap(([name, { field, numbers }]) =>
     numbers.map(({ index, unit }, place) => ({ name: `${name}${component(field, numbers.length, place)}`, unit, request: { field: index } })));
+  return [...named, ...others];
 }
 
 /** Which status values have which unit: by the end of their name. @param {string} path */
@@ -69,8 +76,9 @@ export function choicesOf(source) {
   /** @type {Choice[]} */
   const choices = numbersOf((source.scene?.fields ?? []).filter(({ index }) => !held.has(index)));
   choices.push(...commandsOf(commands));
-  for (const { robot, channel, unit } of source.scene?.sensors ?? []) {
-    choices.push({ name: `reading ${robot}/${channel}[0]`, unit, request: { reading: [robot, channel], index: 0 } });
+  for (const { robot, channel, unit, numbers } of source.scene?.sensors ?? []) {
+    for (const [index, [number, its]] of numbers.entries()) choices.push({ name: `reading ${robot}/${channel}.${number}`, unit: its, request: { reading: [robot, channel], index } });
+    if (!numbers.length) choices.push({ name: `reading ${robot}/${channel}[0]`, unit, request: { reading: [robot, channel], index: 0 } });
   }
   for (const path of numberPaths(source.status)) choices.push({ name: `status ${path}`, unit: statusUnit(path), request: { status: path } });
   for (const link of source.links) for (const [figure] of LINK_FIGURES) choices.push(linkChoice([link.from, link.to], figure));

@@ -20,9 +20,11 @@ interface SceneLink { name: string; body: string; shapes: Shape[] }
 interface SceneBody { name: string; model: string; links: number[]; robot: boolean; removable: boolean; pushable: boolean; settable: Record<string, string>; jobs: SceneJobs[] }
 /** An actuator of whose jobs a sensor tells, and the names of its commands' numbers. */
 interface SceneJobs { actuator: string; numbers: string[] }
-interface SceneField { entity: string; field: string; unit: string; index: number; count: number }
+/** A run of numbers of a field; with a name the number of a joint. */
+interface SceneField { entity: string; field: string; name?: string; unit: string; index: number; count: number }
 interface SceneCommand { robot: string; channel: string; number: string; unit: string; index: number }
-interface SceneSensor { robot: string; channel: string; kind: string; unit: string }
+/** A sensor; `numbers` are the names and units of a reading of joints. */
+interface SceneSensor { robot: string; channel: string; kind: string; unit: string; numbers: [string, string][] }
 /** A kind of marks that a rule of the world brings; with `cut` something is put elsewhere then. */
 interface SceneMark { look: string; text: string; cut: boolean }
 

@@ -114,13 +114,24 @@ test("what is drawn of many points keeps the least and the greatest", () => {
 test("numbers of a field whose units differ have names of their own", () => {
   const source = new Source(INFO);
   const run = { entity: "red.goal", field: "joint_positions" };
-  source.scene = { fields: [{ ...run, unit: "m", index: 4, count: 1 }, { ...run, unit: "rad", index: 5, count: 1 }], sensors: [{ robot: "camera", channel: "ball", unit: "m" }] };
+  source.scene = { fields: [{ ...run, unit: "m", index: 4, count: 1 }, { ...run, unit: "rad", index: 5, count: 1 }], sensors: [{ robot: "camera", channel: "ball", unit: "m", numbers: [] }] };
   source.status = { lag_ms: { p99: 1 }, nodes: { "a.b": { solved_ticks: 3 } } };
   const choices = choicesOf(source);
   assert.deepEqual(choices.get("red.goal joint_positions[1]"), { name: "red.goal joint_positions[1]", unit: "rad", request: { field: 5 } });
   assert.deepEqual(choiceOf(choices, "reading camera/ball[2]").request, { reading: ["camera", "ball"], index: 2 });
   assert.deepEqual(choiceOf(choices, "link a → b: delay").request, { link: ["a", "b"], figure: "delay_ms" });
   assert.equal(choiceOf(choices, "nothing"), null);
+});
+
+test("a joint's numbers have its name, whatever is in it", () => {
+  const source = new Source(INFO);
+  source.scene = {
+    fields: [{ entity: "arm", field: "joint_positions", name: "left/elbow [1]", unit: "rad", index: 7, count: 1 }],
+    sensors: [{ robot: "arm", channel: "state", unit: "", numbers: [["positions.left/elbow [1]", "rad"], ["efforts.left/elbow [1]", "N m"]] }],
+  };
+  const choices = choicesOf(source);
+  assert.deepEqual(choices.get("arm joint_positions.left/elbow [1]").request, { field: 7 });
+  assert.deepEqual(choiceOf(choices, "reading arm/state.efforts.left/elbow [1]"), { name: "reading arm/state.efforts.left/elbow [1]", unit: "N m", request: { reading: ["arm", "state"], index: 1 } });
 });
 
 test("a command is picked by robot, channel and number, and holds until the next one", () => {
