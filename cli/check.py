@@ -113,23 +113,32 @@ def components(
 def urdf(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A URDF file.")],
     assets: Annotated[
-        Path | None, typer.Option(help="The asset folder, which has its meshes; by default that of FILE.")
+        Path | None,
+        typer.Option(help="The asset folder; by default the nearest around FILE that has all meshes."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
     """Show the robot in a URDF file: its tree with joints, limits, masses and shapes, and its entry of a deployment.
 
-    The file is read as by a run, which refuses the same: what is shown is what is simulated. What is passed over is
-    noted.
+    The file is read as by a run, which refuses the same: what is shown is what is simulated. What is passed over,
+    mended or without effect is noted. Of a file with errors all errors are shown, then the notes.
     """
-    from foosim.deployment.assets import read_robot
+    from foosim.deployment.assets import asset_folder, read_robot
+    from foosim.world.bodies.findings import BadRobot
     from foosim.world.bodies.urdf_text import as_json, lines
+    from foosim.world.matter.mesh import AssetError
 
-    robot = read_robot(file, assets)
+    folder = asset_folder(file) if assets is None else assets
+    try:
+        robot = read_robot(file, folder)
+    except BadRobot as bad:
+        raise AssetError("\n".join((bad.what, *bad.notes))) from None
     if json:
-        print_json(as_json(robot))
-    else:
-        print(*lines(robot), sep="\n")
+        print_json({**as_json(robot), "assets": str(folder)})
+        return
+    print(*lines(robot), sep="\n")
+    if folder.resolve() != file.parent.resolve():
+        print(f"\nin the folder {folder}, or with `assets` of that folder")
 
 
 @app.command()

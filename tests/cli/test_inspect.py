@@ -10,9 +10,7 @@ from typing import Final
 
 import pytest
 
-from foosim.deployment.assets import read_robot
 from foosim.deployment.text.yaml import locate_in, plain, read_tree
-from foosim.world.bodies.urdf_text import snippet
 from tests.conftest import Command, Typed
 
 ROOT: Final = Path(__file__).parents[2]
@@ -61,10 +59,10 @@ def test_json_has_the_tree_in_si_units(inspected: Command) -> None:
         ("folder", b"", "folder: no regular file"),
         ("empty.urdf", b"", "empty.urdf:1: an empty file"),
         ("text.urdf", b"hello\n", "text.urdf:1: no XML, syntax error"),
-        ("mimic.urdf", ARM.read_bytes().replace(b"<axis", b'<mimic joint="x"/><axis', 1), "a mimic joint: "),
+        ("mimic.urdf", ARM.read_bytes().replace(b"<axis", b'<mimic joint="x"/><axis', 1), "no joint of this name to "),
         (
             "mesh.urdf",
-            ARM.read_bytes().replace(b"<cylinder", b'<mesh filename="a.stl"/><cylinder', 2),
+            ARM.read_bytes().replace(b'<cylinder radius="0.09" length="0.12"', b'<mesh filename="a.stl"', 2),
             "mesh.urdf:23: a mesh that cannot be read: a.stl: No such file",
         ),
     ],
@@ -78,7 +76,42 @@ def test_what_is_no_robot_is_bad_input(
         (tmp_path / name).write_bytes(content)
     done = inspected(name)
     assert done.code == 2 and done.out == ""
-    assert what in done.err and len(done.err.splitlines()) == 1, done.err
+    assert what in done.err.splitlines()[0], done.err
+
+
+CASE: Final = """<robot name="g">
+<gazebo><plugin name="p1" filename="liba.so"/></gazebo>
+<gazebo><plugin name="p2" filename="libb.so"/></gazebo>
+<link name="base"><inertial><mass value="0"/><inertia ixx="1" iyy="1" izz="1"/></inertial><collision><geometry><mesh \
+filename="x.dae"/></geometry></collision></link>
+<link name="tf/frame"/>
+<link name="f1"><inertial><mass value="-1"/></inertial></link>
+<link name="f2"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="1"/></inertial></link>
+<joint name="a" type="fixed"><parent link="base"/><child link="tf/frame"/></joint>
+<joint name="b" type="revolute"><parent link="base"/><child link="f1"/><mimic joint="a"/><limit lower="0" upper="1" \
+effort="0" velocity="0"/></joint>
+<joint name="c" type="hinge"><parent link="base"/><child link="f2"/></joint>
+</robot>"""
+FOUND: Final = """g.urdf:4: a mesh that cannot be read: x.dae: No such file or directory in {folder}
+g.urdf:6: a mass of -1 kg, valid are 1e-06 to 1e+06 kg; a link without a mass has no inertial
+g.urdf:10: an unknown type of joint, valid are fixed, revolute, continuous, prismatic, 'hinge'
+passed over: gazebo (lines 2, 3): it is for another simulator
+passed over: plugin (lines 2, 3): sensors, actuators and rules are the deployment's
+a mass below 1 mg, of link base (line 4): it counts as none
+inertia of link f2 (line 7): principal moments of 0.1, 0.1 and 1 kg m2: no body has one above the sum of both others, \
+0.2; instead it has 0.4, 0.4, 0.4 kg m2, its sum spread evenly
+an effort of 0, of joint b (line 9): its motor applies no force
+a velocity of 0, of joint b (line 9): its motor cannot move it
+joint b follows a (line 9): that does not move it, it is at 0
+"""
+
+
+def test_all_findings_of_a_file_are_shown_at_once(tmp_path: Path, inspected: Command) -> None:
+    """Errors in the order of the file, then notes."""
+    (tmp_path / "g.urdf").write_text(CASE)
+    done = inspected("g.urdf")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == FOUND.format(folder=tmp_path)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
@@ -87,17 +120,3 @@ def test_a_file_without_permission_is_bad_input(tmp_path: Path, inspected: Comma
     (tmp_path / "a.urdf").chmod(0)
     done = inspected("a.urdf")
     assert done.code == 2 and "a.urdf: Permission denied" in done.err
-
-
-def test_what_has_wheels_is_not_proposed_to_be_fixed(tmp_path: Path) -> None:
-    """A last joint that turns without end is that of an arm; two that end in nothing else are wheels."""
-    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
-    links = "".join(f'<link name="{name}">{inertial}{ball}</link>' for name in "abc")
-    for parents, fixed in (("aa", "false"), ("ab", "true")):
-        joints = "".join(
-            f'<joint name="j{child}" type="continuous"><parent link="{parent}"/><child link="{child}"/></joint>'
-            for parent, child in zip(parents, "bc", strict=True)
-        )
-        (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joints}</robot>')
-        assert f"fixed: {fixed}, " in snippet(read_robot(tmp_path / "r.urdf", None))

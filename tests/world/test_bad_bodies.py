@@ -38,16 +38,10 @@ def line_of(what: str) -> int:
 
 FIRST_JOINT: Final = ARM[ARM.index("<joint") :].partition(">")[0] + ">"
 FIRST_MASS: Final = ARM[ARM.index("<mass") :].partition("/>")[0] + "/>"
-FIRST_INERTIA: Final = ARM[ARM.index("<inertia ") :].partition("/>")[0] + "/>"
 
 FILES: Final[dict[str, tuple[str, str, str]]] = {
     "a loop": ("</robot>", LOOP, "a loop: "),
     "a mass of a mountain": (FIRST_MASS, '<mass value="1e8"/>', "a mass of 1e+08 kg, valid are 1e-06 to 1e+06 kg"),
-    "an inertia that no body has": (
-        FIRST_INERTIA,
-        '<inertia ixx="1" iyy="1" izz="5"/>',
-        "principal moments of 1, 1 and 5 kg m2: no body has one above the sum of both others, 2",
-    ),
 }
 
 

@@ -470,7 +470,10 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     ),
     "out of package": (collision('<mesh filename="package://p/../../a.stl"/>'), "4: a path inside the asset folder"),
     "absolute": (collision('<mesh filename="/etc/a.stl"/>'), "4: a path inside the asset folder is relative"),
-    "scheme": (collision('<mesh filename="file:///a.stl"/>'), "4: a mesh is a path relative to this file, or package://PACKAGE/PATH"),
+    "scheme": (
+        collision('<mesh filename="file:///a.stl"/>'),
+        "4: a mesh is a path relative to this file, or package://PACKAGE/PATH",
+    ),
     "no scale": (collision('<mesh filename="shard.obj" scale="1 0 1"/>'), "4: scale of mesh is below 1e-06"),
     "flat mesh": (
         collision('<mesh filename="flat.obj"/>'),

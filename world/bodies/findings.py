@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final, ParamSpec, TypeVar
 
@@ -14,16 +15,22 @@ SHOWN_MAX: Final = 50
 NAMED_MAX: Final = 8
 """The count of names and of lines in one note."""
 
+_LINE: Final = re.compile(r":([0-9]+): ")
 Read = TypeVar("Read")
 Given = ParamSpec("Given")
 
 
 class BadRobot(AssetError):
-    """A file with errors: a line for each, in the order of the file. `notes` are what else there is to know of it."""
+    """A file with errors, `file:line: what`: they are shown in the order of their lines. `notes` are other findings."""
 
     def __init__(self, errors: Sequence[str], notes: tuple[str, ...]) -> None:
-        super().__init__("\n".join(bounded(errors)))
+        super().__init__("\n".join(bounded(sorted(errors, key=_line_of))))
         self.notes = notes
+
+
+def _line_of(error: str) -> int:
+    found = _LINE.search(error)
+    return int(found[1]) if found else 0
 
 
 def bounded(texts: Sequence[str]) -> Iterator[str]:
@@ -67,8 +74,7 @@ class Findings:
         kinds = sorted(self._notes.items(), key=lambda one: one[1][0][1])
         notes = tuple(bounded([_note(what, why, places) for (what, why), places in kinds]))
         if self._errors:
-            errors = sorted(self._errors, key=lambda error: error.line)
-            raise BadRobot([*dict.fromkeys(map(str, errors))], notes)
+            raise BadRobot([*dict.fromkeys(map(str, self._errors))], notes)
         return notes
 
 

@@ -99,9 +99,7 @@ def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> Join
         damping = findings.read(0.0, number_of, dynamics, "damping", 0.0, NUMBER_MAX, 0.0)
     axis = findings.read(X_AXIS, _axis, joint)
     ends = limit.ends or (0.0, 0.0)
-    found = JointPart(
-        name, joint, kind, parent, child, place, axis, ends, limit.effort, limit.speed, damping, follows
-    )
+    found = JointPart(name, joint, kind, parent, child, place, axis, ends, limit.effort, limit.speed, damping, follows)
     if kind != "continuous" and ends[0] == ends[1]:
         findings.note(joint, f"limits {ends[0]:g} to {ends[1]:g} hold joint", "it is fixed there", name)
         return _held_at(found, ends[0])
@@ -273,7 +271,7 @@ def followers_of(joints: Sequence[JointPart], findings: Findings) -> tuple[list[
 
 def _followed(joint: JointPart, joints: Mapping[str, JointPart]) -> Following:
     """Return how a joint follows the first joint of its chain. Raises BadElement."""
-    ratio, offset, seen = 1.0, 0.0, [joint.name]
+    ratio, offset, seen, own = 1.0, 0.0, [joint.name], joint.follows or joint.element
     while joint.follows is not None:
         mimic = joint.follows
         offset += ratio * number_of(mimic, "offset", -NUMBER_MAX, NUMBER_MAX, 0.0)
@@ -282,7 +280,7 @@ def _followed(joint: JointPart, joints: Mapping[str, JointPart]) -> Following:
         if name not in joints:
             raise mimic.error("no joint of this name to follow", name, nearest_name(name, joints))
         if name in seen:
-            raise mimic.error("a joint that follows itself", " > ".join((*seen, name)))
+            raise own.error("a joint that follows itself", " > ".join((*seen, name)))
         seen.append(name)
         joint = joints[name]
     return Following(joint.name, ratio, offset)

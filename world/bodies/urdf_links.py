@@ -127,9 +127,11 @@ def _mass(link: Element, name: str, shapes: Sequence[Shape], findings: Findings)
     inertial = findings.read(None, link.one_of, "inertial")
     if inertial is None:
         return nothing
-    mass = findings.read(0.0, _mass_value, inertial)
+    mass = findings.read(None, _mass_value, inertial)
     tensor = findings.read(NO_TENSOR, _tensor, inertial)
     position, orientation = findings.read(UNMOVED, placed_by, inertial)
+    if mass is None:
+        return nothing
     if mass < MASS_MIN_KG:
         findings.note(inertial, f"a mass below {MASS_MIN_KG * 1e6:g} mg, of link", "it counts as none", name)
         return nothing

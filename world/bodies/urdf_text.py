@@ -13,6 +13,9 @@ from foosim.world.bodies.urdf_base import base_of, height_of, wheels_of
 from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Mimic, Shape, Sphere
 
 MOST_DIGITS = 6
+ROUNDING_M = 1e-6
+FIXED_DEPTH_M = 1e-3
+"""How deep in the floor the lowest point of a fixed robot may be."""
 
 
 def as_json(robot: Robot) -> dict[str, Any]:
@@ -103,9 +106,9 @@ def lines(robot: Robot) -> Iterator[str]:
 def snippet(robot: Robot) -> str:
     """Return the entry of a robot in a deployment, as YAML: it stands on the floor, wheels by their speeds."""
     name = robot.name if is_robot_name(robot.name) else "robot"
-    is_fixed = "true" if base_of(robot)[0] else "false"
-    up = ceil(1000.0 * height_of(robot) - 1e-6)
-    at = "{x: 0 m, y: 0 m}" if up <= 0 else f"{{x: 0 m, y: 0 m, z: {up} mm}}"
+    is_fixed, height = base_of(robot)[0], height_of(robot)
+    is_level = height <= (FIXED_DEPTH_M if is_fixed else ROUNDING_M)
+    at = "{x: 0 m, y: 0 m}" if is_level else f"{{x: 0 m, y: 0 m, z: {ceil(1000.0 * height)} mm}}"
     wheels = wheels_of(robot)
     led = [link.joint_name for link in robot.links if link.joint in MOVING and link.mimic is None]
     others = [joint for joint in led if joint not in wheels]
@@ -116,7 +119,7 @@ def snippet(robot: Robot) -> str:
         if joints
     ]
     actuators = f", actuators: {{{', '.join(shown)}}}" if shown else ""
-    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, at: {at}, fixed: {is_fixed}{actuators}}}\n"
+    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, at: {at}, fixed: {'true' if is_fixed else 'false'}{actuators}}}\n"
 
 
 def _joint_text(robot: Robot, link: Link) -> str:

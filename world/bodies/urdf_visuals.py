@@ -61,16 +61,18 @@ def _mesh_parts(
 ) -> Iterator[tuple[Box | Sphere | Cylinder | Capsule | Mesh, Colour | None]]:
     """Yield the parts of a mesh, each with its own colour if the file has one."""
     import numpy as np
-    from foosim.world.bodies.visual_meshes import drawn_parts, drawn_path
+    from foosim.world.bodies.visual_meshes import TRIANGLES_MAX, drawn_parts, drawn_path
 
     path = mesh_path(mesh)
     drawn = drawn_path(path)
     if drawn not in files:
         raise mesh.error("the file of a mesh is missing", path)
     scale = scale_of(mesh)
-    parts, problem = drawn_parts(files[drawn])
-    if problem:
-        findings.note(mesh, UNDRAWN if not parts else "a visual is drawn in part", problem)
+    parts, remark = drawn_parts(files[drawn])
+    if remark and parts:
+        findings.note(mesh, "passed over: small triangles of visuals", f"of a mesh {TRIANGLES_MAX:,} are drawn")
+    elif remark:
+        findings.note(mesh, UNDRAWN, remark)
     for vertices, triangles, colour in parts:
         placed = np.ascontiguousarray(vertices * scale)
         corners = triangles if scale[0] * scale[1] * scale[2] > 0.0 else np.ascontiguousarray(triangles[:, ::-1])

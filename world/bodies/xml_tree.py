@@ -66,7 +66,9 @@ class Element:
         found = [*self.all_of(*tags)]
         for other in found[1:]:
             if (other.attributes, other.children) != (found[0].attributes, found[0].children):
-                raise other.error(f"a second {other.tag} in the {self.tag} of line {self.line}, different from the first")
+                raise other.error(
+                    f"a second {other.tag} in the {self.tag} of line {self.line}, different from the first"
+                )
         return found[0] if found else None
 
     def below(self, *tags: str) -> Iterator[Element]:
