@@ -247,7 +247,6 @@ def _link(
         effort=joint.effort,
         speed=joint.speed,
         damping=joint.damping,
-        joint_name=joint.name,
         mimic=None if its is None else Mimic(at[its.leader], its.ratio, its.offset),
     )
 
