@@ -46,7 +46,15 @@ class Running:
         pinned, files = pin_assets(yaml.safe_dump(json.loads(json.dumps(text)), sort_keys=False), NAME, asset_folder(file))
         self.simulation = Simulation(load_deployment(pinned, NAME).with_assets(files))
         self.body: Body = self.simulation.scene.bodies[self.name]
-        self.joints = [link.joint_name or link.name.removeprefix(f"{self.name}/") for link in self.body.joints]
+        self.joints = [link.joint_name for link in self.body.joints]
+        """The names of those that move."""
+        self.led = [link.joint_name for link in self.body.joints if link.mimic is None]
+        self.followers = {
+            link.joint_name: (self.body.links[link.mimic.leader].joint_name, link.mimic.ratio, link.mimic.offset)
+            for link in self.body.joints
+            if link.mimic is not None
+        }
+        """By joint: the one that it follows, their ratio, and the offset."""
 
     def stand(self, positions: Sequence[float]) -> None:
         """Begin in a stance: these positions of its joints, its lowest point on the floor, at rest."""
@@ -64,6 +72,12 @@ class Running:
                 at = place(shape, position, orientation)
                 for part in convex_parts(shape, *at, ORIGIN, ORIGIN):
                     yield part.farthest((0.0, 0.0, -1.0))[2]
+
+    def turned(self) -> list[float]:
+        """Return where its wheels are (rad)."""
+        wheels = self.simulation.deployment.robots[self.name].actuators["wheels"].joints
+        at = dict(zip(self.joints, self["joint_positions"], strict=True))
+        return [at[joint] for joint in wheels if "wheel" in joint]
 
     def put(self, **fields: Sequence[float]) -> None:
         """Begin with other numbers of its fields."""

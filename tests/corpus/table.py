@@ -18,9 +18,11 @@ from foosim.world.bodies.urdf import SUFFIX, Robot
 
 HERE: Final = Path(__file__).parent
 TABLE: Final = HERE / "table.txt"
+EXAMPLE: Final = "example-robot-data"
+PYBULLET: Final = "pybullet_data"
 PUBLIC: Final = {
-    "example-robot-data": ("example-robot-data", "cmeel.prefix/share/example-robot-data/robots"),
-    "pybullet_data": ("pybullet", "pybullet_data"),
+    EXAMPLE: (EXAMPLE, "cmeel.prefix/share/example-robot-data/robots"),
+    PYBULLET: ("pybullet", "pybullet_data"),
 }
 """Sets of robots on PyPI: the distribution that has each, and its folder among the installed packages."""
 OWN: Final = "files"
