@@ -39,7 +39,7 @@ from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity
 from foosim.world.matter.mesh import Mesh
-from foosim.world.scene import Body, Box, Capsule, Hull, Shape, Sphere, Vector, moved, rotate
+from foosim.world.scene import Body, Box, Capsule, Hull, Shape, Sphere, Vector, looks_of, moved, rotate
 from foosim.world.scene import Quaternion as Turn
 
 WORLD_FRAME: Final = "world"
@@ -93,8 +93,8 @@ class View:
             SceneEntityDeletion(timestamp=at, type=SceneEntityDeletionType.MatchingId, id=link.name) for link in gone
         ]
         entities = [_entity(at, SCENERY, WORLD_FRAME, self._scenery)]
-        for _, body in self._present:
-            entities += [_entity(at, link.name, link.name, link.shapes) for link in body.links]
+        for link, shapes in looks_of(link for _, body in self._present for link in body.links):
+            entities.append(_entity(at, link.name, link.name, shapes))
         return SceneUpdate(deletions=deletions, entities=entities).encode()
 
     @property

@@ -63,6 +63,8 @@ VISUAL_BYTES_MAX: Final = 64 * 1024 * 1024
 """A file of a mesh that is only drawn: it becomes a small one before it is part of a deployment."""
 VISUAL_TRIANGLES_MAX: Final = 2_000_000
 """A mesh that is only drawn, before it is made small."""
+LOOKS_TRIANGLES_MAX: Final = 1_000_000
+"""All visuals of a world's bodies: beyond it links are drawn by their collision shapes."""
 SCENERY_TRIANGLES_MAX: Final = 400_000
 """All meshes of a world: they go to a viewer in one message, which fits one chunk of a capture."""
 

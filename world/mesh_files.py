@@ -71,8 +71,7 @@ def read_parts(name: str, content: bytes, triangles_max: int) -> list[Part]:
             from foosim.world.matter.collada_file import read_collada  # brings pycollada
 
             return read_collada(name, content, triangles_max)
-    choices = ", ".join(MESH_SUFFIXES)
-    raise AssetError(f"{name}: {describe('no format of a mesh', name[name.rfind('.') :])}, there are {choices}")
+    raise AssetError(f"{name}: no format of a mesh, there are {', '.join(MESH_SUFFIXES)}")
 
 
 def pieces(mesh: Mesh, triangles_max: int) -> Iterator[Mesh]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from math import cos, inf, sin, sqrt
 from typing import Final, Literal, TypeAlias
 
+from foosim.common import limits
 from foosim.world.matter.materials import UNKNOWN, RadioMaterial
 from foosim.world.matter.mesh import Mesh
 
@@ -195,6 +196,20 @@ class Scene:
 
     bodies: Mapping[str, Body]
     scenery: tuple[Shape, ...]
+
+
+def looks_of(links: Iterable[Link]) -> list[tuple[Link, tuple[Shape, ...]]]:
+    """Return links with what they look like: their visuals, without any their shapes. Those whose visuals would make
+    the triangles of all more than `limits.LOOKS_TRIANGLES_MAX` look like their shapes, too."""
+    looks = []
+    left = limits.LOOKS_TRIANGLES_MAX
+    for link in links:
+        meshes = [shape.geometry for shape in link.visuals if isinstance(shape.geometry, Mesh)]
+        count = sum([len(mesh.triangles) for mesh in meshes])
+        fits = bool(link.visuals) and count <= left
+        left -= count if fits else 0
+        looks.append((link, link.visuals if fits else link.shapes))
+    return looks
 
 
 def inertia_about_axis(link: Link) -> float:

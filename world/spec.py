@@ -35,7 +35,7 @@ KITS: Final = "kits"
 KITS_MAX: Final = 16
 RULES_MAX: Final = 64
 SURFACES_MAX: Final = 64
-ROBOT_FILES_MAX: Final = 128
+ROBOT_FILES_MAX: Final = 256
 """The greatest count of files of robots' models in one world."""
 
 Section = TypeVar("Section", bound=SpecBase)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from foosim.world.components.job_reading import JobSettings
 from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
-from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, shape_box, swept_box
+from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, looks_of, shape_box, swept_box
 from foosim.world.setting.settable import settable
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -45,9 +46,11 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
     meshes: dict[str, Mesh] = {}
     links: list[dict[str, Any]] = []
     bodies: list[dict[str, Any]] = []
+    looks = iter(looks_of(link for body in scene.bodies.values() for link in body.links))
     for name, body in scene.bodies.items():
         first = len(links)
-        links += [{"name": link.name, "body": name, "shapes": _shapes(link.shapes, meshes)} for link in body.links]
+        for link, shapes in islice(looks, len(body.links)):
+            links.append({"name": link.name, "body": name, "shapes": _shapes(shapes, meshes)})
         bodies.append(
             {
                 "name": name,

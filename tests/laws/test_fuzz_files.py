@@ -29,6 +29,7 @@ from foosim.runtime.run_folder import RunFolder, RunInfo
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
 from foosim.vhub.state.records import fold
+from foosim.world.bodies.visual_meshes import drawn_content, drawn_parts
 from foosim.world.matter.mesh import AssetError
 from foosim.world.mesh_files import read_mesh
 from foosim.world.robot_packets import Delivered
@@ -70,6 +71,18 @@ TOKENS: Final = (
     *("\x00", "\ufeff", "\u2028", '"\\ud800"', "1e999", ".nan", "-.inf", "0x" + "f" * 50, "9" * 50, "12:30:45", "on"),
     *("2 ms", "-1 ms", "1e300 s", "../..", "file:///x", "\t", ": ", "\n  ", "#", "'", '"', "%YAML 9.9\n", "world: x\n"),
 )
+COLLADA: Final = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="0.1"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id="g"><mesh>
+<source id="s"><float_array id="f" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array><technique_common>
+<accessor source="#f" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#s"/></vertices>
+<polylist count="2"><input semantic="VERTEX" source="#v" offset="0"/><vcount>3 4</vcount><p>0 1 2 3 2 1 0</p></polylist>
+<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 3</p></triangles>
+</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="w"><node id="n"><matrix>1 0 0 0
+0 2 0 0 0 0 1 5 0 0 0 1</matrix><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#w"/></scene></COLLADA>
+"""
 REFUSED: Final = (Refused, DeploymentError, AssetError, CaptureError, Malformed)
 Spoil = Callable[[random.Random, bytes], bytes]
 
@@ -112,12 +125,14 @@ def test_spoiled_meshes_are_refused_or_are_meshes(fuzz: Fuzz, disturbed: Disturb
         "a.obj": f"{corners}f 1 2 3\nf -1/1 -2/1 -3/1 -4/1\n".encode(),
         "b.stl": f"solid a\n{facet}{facet}endsolid a\n".encode(),
         "c.stl": bytes(80) + b"\2\0\0\0" + bytes(range(100)),
+        "d.DAE": COLLADA.encode(),
     }
 
     def bring(rng: random.Random, count: int) -> Iterator[bytes]:
         for _ in range(count):
             name = rng.choice(sorted(good))
-            content = disturbed.mutated(rng, good[name])
+            is_text = name == "d.DAE" and rng.random() < 0.5
+            content = spoiled_text(rng, COLLADA).encode(errors="replace") if is_text else disturbed.mutated(rng, good[name])
             yield content
             try:
                 mesh = read_mesh(name, content, rng.choice((1.0, 1e-6, 1e6)))
@@ -125,6 +140,8 @@ def test_spoiled_meshes_are_refused_or_are_meshes(fuzz: Fuzz, disturbed: Disturb
                 assert str(error).isprintable() and str(error).startswith(name)
             else:
                 assert mesh.triangles.max() < len(mesh.vertices)
+            parts, remark = drawn_parts(drawn_content(name, content))
+            assert parts or remark.startswith(name)
 
     fuzz.run(bring)
 

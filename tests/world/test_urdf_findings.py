@@ -17,7 +17,7 @@ from foosim.world.bodies.urdf_text import as_json, snippet
 from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content
 from foosim.world.components.drives import Drives, Motor
 from foosim.world.matter.mesh import AssetError, Mesh
-from foosim.world.scene import ORIGIN, UPRIGHT, Box, Link, Mimic, Shape, Sphere, from_rpy
+from foosim.world.scene import ORIGIN, UPRIGHT, Box, Mimic, Shape, Sphere, from_rpy
 from tests.solids import Solids, physics
 
 MASS: Final = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>'
@@ -35,9 +35,10 @@ def joint(name: str, ends: str, content: str = LIMIT, kind: str = "revolute") ->
     return f'<joint name="{name}" type="{kind}"><parent link="{ends[0]}"/><child link="{ends[1]}"/>{content}</joint>\n'
 
 
-def read(*parts: str, **files: bytes) -> Robot:
+def read(*parts: str, drawn: bytes = b"") -> Robot:
+    """A robot of these parts, each on a line; `drawn` is the drawn form of a mesh `a.obj`."""
     text = f'<robot name="r">\n{"".join(parts)}</robot>'
-    return read_urdf("r.urdf", {"r.urdf": text.encode(), **{name.replace("_", "."): files[name] for name in files}})
+    return read_urdf("r.urdf", {"r.urdf": text.encode(), "a.obj.visual": drawn})
 
 
 def pair(content: str = LIMIT, kind: str = "revolute", child: str = MASS + BALL) -> Robot:
@@ -113,7 +114,7 @@ def test_joints_follow_the_first_of_their_chain() -> None:
     assert [(one.joint_name, one.mimic) for one in robot.links[1:]] == [
         ("k", Mimic(2, 2.0, 0.1)),
         ("j", None),
-        ("l", Mimic(2, -6.0, pytest.approx(0.7))),
+        ("l", Mimic(2, -6.0, 1.0 - 3.0 * 0.1)),
     ]
     assert "follows j x -6 + 0.7 rad" in " ".join(_text(robot))
 
@@ -314,7 +315,7 @@ def test_looks_have_shapes_and_colours_of_their_own() -> None:
         visual('<sphere radius="3"/>'),
         visual('<mesh filename="a.obj" scale="1 2 -3"/>', '<material name="x"><color rgba="0 0 1 0.5"/></material>'),
     ]
-    robot = read(RED, link("a", MASS + BALL + "".join(looks)), **{"a_obj_visual": drawn_content("a.obj", SHARD)})
+    robot = read(RED, link("a", MASS + BALL + "".join(looks)), drawn=drawn_content("a.obj", SHARD))
     box, ball, mesh = robot.links[0].visuals
     assert (box.geometry, box.colour, ball.geometry) == (Box((1.0, 2.0, 3.0)), (1.0, 0.0, 0.0, 1.0), Sphere(3.0))
     assert ball.colour == (0.6, 0.6, 0.6, 1.0) and mesh.colour == (0.0, 0.0, 1.0, 0.5)
@@ -335,11 +336,14 @@ def test_looks_have_shapes_and_colours_of_their_own() -> None:
         (visual("<cone/>"), "an unknown shape, there are box, sphere, cylinder, capsule, mesh, 'cone'"),
         (visual('<mesh filename="b.obj"/>'), "the file of a mesh is missing, 'b.obj'"),
         (visual('<mesh filename="a.obj"/>'), "a.obj: too round"),
-        (visual('<mesh filename="file:///a.obj"/>'), "a mesh is a path relative to this file, or package://PACKAGE/PATH, 'file:///a.obj'"),
+        (
+            visual('<mesh filename="file:///a.obj"/>'),
+            "a mesh is a path relative to this file, or package://PACKAGE/PATH, 'file:///a.obj'",
+        ),
     ],
 )  # fmt: skip
 def test_a_visual_that_cannot_be_drawn_is_no_error(looks: str, why: str) -> None:
-    robot = read(link("a", MASS + BALL + looks), **{"a_obj_visual": undrawn_content("a.obj: too round")})
+    robot = read(link("a", MASS + BALL + looks), drawn=undrawn_content("a.obj: too round"))
     assert robot.notes == (f"a visual is not drawn (line 2): {why}",) and robot.links[0].visuals == ()
 
 

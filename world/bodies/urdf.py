@@ -16,7 +16,7 @@ from functools import lru_cache
 from typing import Final
 
 from foosim.world.bodies.findings import Findings
-from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of
+from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of, without_rounding
 from foosim.world.bodies.urdf_joints import Following, JointPart, Tree, followers_of, in_tree, read_joint
 from foosim.world.bodies.urdf_links import LinkPart, mesh_path, meshes_in, read_link
 from foosim.world.bodies.urdf_masses import with_masses
@@ -93,7 +93,8 @@ def place_of_mesh(path: str, content: bytes, mesh: str) -> str:
 
 
 def _mesh_elements(path: str, content: bytes) -> dict[str, Element]:
-    robot, found = _robot_of(path, content), {}
+    robot = _robot_of(path, content)
+    found: dict[str, Element] = {}
     for part, path_of in (("collision", mesh_path), ("visual", _drawn_mesh)):
         for mesh in meshes_in(robot, part):
             try:
@@ -226,10 +227,10 @@ def _link(
         link.name,
         "fixed",
         link.shapes,
-        link.mass.mass,
-        link.moments,
-        link.mass.centre,
-        principal=link.principal,
+        link.mass,
+        link.inertia.moments,
+        link.centre_of_mass,
+        principal=link.inertia.axes,
         visuals=link.visuals,
     )
     if joint is None:
@@ -352,10 +353,11 @@ def _with_base_mass(robot: Robot, links: list[Link]) -> list[Link]:
     """Return links of which the first has the mass of all that is fixed to it, and these have none."""
     whole = _base_mass(robot)
     moments, axes = principal_of(whole.tensor)
+    inertia = without_rounding(moments)
     found = [
         replace(link, mass=0.0, inertia=ORIGIN, centre_of_mass=ORIGIN, principal=UPRIGHT) if number in held else link
         for held in [_base(robot)]
         for number, link in enumerate(links)
     ]
-    found[0] = replace(found[0], mass=whole.mass, inertia=moments, centre_of_mass=whole.centre, principal=axes)
+    found[0] = replace(found[0], mass=whole.mass, inertia=inertia, centre_of_mass=whole.centre, principal=axes)
     return found

@@ -1,7 +1,7 @@
 """Whether the base of a robot is fixed, as its file suggests: a proposal, for a URDF does not say it.
 
-A base is free where nothing moves in it (an object), where it has two or more links at ends that turn without limits
-about their middles (wheels, rotors), and where it stands on two or more moving parts (legs): the lowest point of each of these is the lowest
+A base is free where nothing moves in it (an object), where two or more links at ends turn without limits about their
+middles (wheels, rotors), and where it stands on two or more moving parts (legs): each reaches down to the lowest point
 of the robot. It is fixed in all other cases (arms, grippers, pendulums), where the first link is called `world`, and
 where it has no mass.
 """

@@ -246,7 +246,7 @@ class Following:
 
 
 def followers_of(joints: Sequence[JointPart], findings: Findings) -> tuple[list[JointPart], dict[str, Following]]:
-    """Return joints, and how those that follow another do, by name; one whose leader is fixed is fixed, too."""
+    """Return joints, and by name how a joint follows another; one whose leader is fixed is fixed, too."""
     by_name = {joint.name: joint for joint in joints}
     made: list[JointPart] = []
     following: dict[str, Following] = {}

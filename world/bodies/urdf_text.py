@@ -113,13 +113,15 @@ def snippet(robot: Robot) -> str:
     led = [link.joint_name for link in robot.links if link.joint in MOVING and link.mimic is None]
     others = [joint for joint in led if joint not in wheels]
     parts = [("wheels", "joint_velocity", wheels), ("joints", "joint_position", others)]
+    are_both = bool(wheels and others)
     shown = [
-        f"{part}: {{kind: {kind}{f', joints: {dumps(joints, ensure_ascii=False)}' if wheels and others else ''}}}"
+        f"{part}: {{kind: {kind}{f', joints: {dumps(joints, ensure_ascii=False)}' if are_both else ''}}}"
         for part, kind, joints in parts
         if joints
     ]
     actuators = f", actuators: {{{', '.join(shown)}}}" if shown else ""
-    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, at: {at}, fixed: {'true' if is_fixed else 'false'}{actuators}}}\n"
+    base = f"at: {at}, fixed: {'true' if is_fixed else 'false'}"
+    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, {base}{actuators}}}\n"
 
 
 def _joint_text(robot: Robot, link: Link) -> str:

@@ -61,6 +61,7 @@ def _mesh_parts(
 ) -> Iterator[tuple[Box | Sphere | Cylinder | Capsule | Mesh, Colour | None]]:
     """Yield the parts of a mesh, each with its own colour if the file has one."""
     import numpy as np
+
     from foosim.world.bodies.visual_meshes import TRIANGLES_MAX, drawn_parts, drawn_path
 
     path = mesh_path(mesh)

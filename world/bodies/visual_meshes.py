@@ -25,10 +25,12 @@ DRAWN_SUFFIX: Final = ".visual"
 TRIANGLES_MAX: Final = 5_000
 """Of a mesh in drawn form."""
 SPARED: Final = 16
-"""A part of a mesh keeps as many triangles, where it has them, however few its share would be."""
+"""Triangles that each colour of a mesh keeps, before the others are shared out."""
 COLOURS_MAX: Final = 64
 GRIDS: Final = (256, 128, 64, 32, 16)
 """Cells along the longest side of a mesh."""
+FAR: Final = 1e9
+"""No coordinate is that far out; the unit may be anything until it is scaled."""
 BAD: Final = "no drawn form of a mesh"
 
 
@@ -66,6 +68,10 @@ def drawn_content(name: str, content: bytes, triangles_max: int = TRIANGLES_MAX)
         parts = read_parts(name, content, limits.VISUAL_TRIANGLES_MAX)
     except AssetError as error:
         return undrawn_content(str(error))
+    if not all(abs(vertices).max(initial=0.0) < FAR for vertices, _, _ in parts):  # nan is not, either
+        return undrawn_content(f"{name}: a coordinate is too large or not finite")
+    if not any(len(triangles) for _, triangles, _ in parts):
+        return undrawn_content(f"{name}: no triangle")
     return _packed(parts, triangles_max)
 
 
@@ -99,10 +105,12 @@ def drawn_parts(content: bytes) -> tuple[list[Part], str]:
 
 def _packed(parts: list[Part], triangles_max: int) -> bytes:
     whole = sum(len(triangles) for _, triangles, _ in parts)
-    share = min(1.0, triangles_max / whole) if whole else 1.0
+    found = _by_colour(parts)
+    share = max(0.0, triangles_max - SPARED * len(found)) / whole
     packed = []
-    for colour, (vertices, triangles) in _by_colour(parts).items():
-        vertices, triangles = _decimated(vertices, triangles, max(int(len(triangles) * share), SPARED))
+    for colour, (vertices, triangles) in found.items():
+        if whole > triangles_max:
+            vertices, triangles = _decimated(vertices, triangles, SPARED + int(len(triangles) * share))
         if len(triangles):
             packed.append(_DrawnPart(vertices.astype("<f4").tobytes(), triangles.astype("<u2").tobytes(), colour))
     return msgspec.msgpack.encode(_Drawn(whole, packed))
@@ -111,6 +119,7 @@ def _packed(parts: list[Part], triangles_max: int) -> bytes:
 def _by_colour(parts: list[Part]) -> dict[Colour | None, tuple[NDArray[np.float64], NDArray[np.int32]]]:
     """Return the triangles of each colour, with corners at one place as one; of too many colours the first ones."""
     import numpy as np
+
     from foosim.world.mesh_files import merged
 
     corners: dict[Colour | None, list[NDArray[np.float64]]] = {}
@@ -129,6 +138,7 @@ def _decimated(
         return vertices, triangles
     import fast_simplification
     import numpy as np
+
     from foosim.world.mesh_files import merged
 
     vertices, triangles = fast_simplification.simplify(vertices, triangles, target_count=most)

@@ -104,7 +104,7 @@ def read_xml(name: str, content: bytes) -> Element:
 
 
 def _blank(declaration: re.Match[bytes]) -> bytes:
-    """Return the lines of a declaration without their text. Blank lines above it are no XML, but many files have them."""
+    """Return the lines of a declaration without their text: files have blank lines above it, which XML does not."""
     return b"\n" * declaration[0].count(b"\n")
 
 

@@ -2,6 +2,7 @@
 
 pycollada reads it. It would unpack an archive and follow a node as often as others place it; both are bounded here.
 It reads strictly first; where that fails, without images and colours, of which files often name some that are missing.
+To it a coordinate of nan is 0.
 A document type is refused, and with it every entity.
 
 The axis that points up is turned to z, as the format has it, but for files of MeshLab, which writes Y_UP whatever the
@@ -69,10 +70,13 @@ def read_collada(name: str, content: bytes, triangles_max: int) -> list[Part]:
         for primitive, matrix, colour in _placed(name, document):
             vertices, triangles = _surface(primitive, left)
             left -= len(triangles)
+            if len(triangles) == 0:
+                continue
             if np.linalg.det(matrix[:3, :3]) < 0.0:  # mirrored: corners stay counter-clockwise, seen from outside
                 triangles = triangles[:, ::-1]
-            placed = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-            parts.append((placed @ turn.T * unit, triangles, colour))
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+                placed = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ turn.T * unit
+            parts.append((placed, triangles, colour))
     except AssetError:
         raise
     except _TooMany:
@@ -80,6 +84,8 @@ def read_collada(name: str, content: bytes, triangles_max: int) -> list[Part]:
     except Exception as error:  # what pycollada and numpy raise for a malformed document is of many types
         reason = f"{type(error).__name__} {' '.join(str(error).split())}"[:100]
         raise AssetError(f"{name}: {describe('no valid COLLADA file', reason)}") from None
+    if not parts:
+        raise AssetError(f"{name}: a scene without a surface")
     return parts
 
 
