@@ -9,7 +9,7 @@ PROTOCOL_VERSION: Final = 5
 """Version of the messages; a peer with another one is refused at the handshake, both versions named."""
 
 NAME_LENGTH_MAX: Final = 32
-PART_NAME_LENGTH_MAX: Final = 128
+PART_NAME_LENGTH_MAX: Final = 256
 """Characters of the name of a link or joint of a robot."""
 ENTITIES_MAX: Final = 4096
 COMPONENTS_MAX: Final = 256

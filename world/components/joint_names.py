@@ -13,7 +13,7 @@ from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import PartName
 from foosim.world.component_types.descriptions import JOINTS_MAX
 from foosim.world.components.view import IncompatibleComponent
-from foosim.world.scene import MOVING, Body
+from foosim.world.scene import Body
 
 WILDCARDS: Final = frozenset("*?[")
 
@@ -60,8 +60,7 @@ def joint_indices(
 
 def _following(body: Body, joint: int) -> str:
     """Return in words why a joint has no motor of its own."""
-    moving = [index for index, link in enumerate(body.links) if link.joint in MOVING]
-    mimic = body.links[moving[joint]].mimic
+    mimic = body.joints[joint].mimic
     assert mimic is not None, body.name
-    names = body.joint_names
-    return f"joint {names[joint]} of {body.name} follows joint {names[moving.index(mimic.leader)]}: it has no motor"
+    leader = body.links[mimic.leader].joint_name or body.link_names[mimic.leader]
+    return f"joint {body.joint_names[joint]} of {body.name} follows joint {leader}: it has no motor of its own"
