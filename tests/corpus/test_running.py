@@ -1,5 +1,5 @@
-"""Robots of the corpus run by the entries that are proposed for them: arms hold set-points under gravity, grippers their
-couplings, legs stand still, and wheels roll.
+"""Robots of the corpus run by the entries that are proposed for them: arms hold set-points under gravity, grippers are
+coupled, legs stand still, and wheels roll.
 """
 
 from __future__ import annotations

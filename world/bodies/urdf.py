@@ -239,6 +239,7 @@ def _link(
     return replace(
         made,
         joint=joint.kind,
+        joint_name=joint.name,
         axis=joint.axis,
         limits=joint.limits,
         parent=index[joint.parent],
