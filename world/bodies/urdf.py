@@ -25,6 +25,7 @@ from foosim.world.bodies.xml_tree import BadElement, Element, read_xml
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Mimic, Quaternion, Shape, Vector, multiply, rotate
 
 SUFFIX: Final = ".urdf"
+XACRO: Final = ".xacro"
 SHAPES_MAX: Final = 256
 """Of collision: pairs of shapes that may touch are listed, and their count grows with its square."""
 KEPT: Final = 32
@@ -138,14 +139,19 @@ def _read(path: str, content: bytes, meshes: tuple[tuple[str, bytes], ...]) -> R
 def _robot_of(path: str, content: bytes) -> Element:
     robot = read_xml(path, content)
     macro = next(_macros(robot), None)
-    if macro is not None or path.endswith(".xacro"):
-        name = path.rpartition("/")[2]
-        out = name.removesuffix(".xacro").removesuffix(SUFFIX) + SUFFIX
-        expand = f"xacro {name} > {out if out != name else 'robot' + SUFFIX}"
-        raise (macro or robot).error(f"a file of xacro, which makes a URDF file of it: {expand}")
+    if macro is not None or path.endswith(XACRO):
+        raise (macro or robot).error(unexpanded(path))
     if robot.tag != "robot":
         raise robot.error("no URDF: the outermost element is robot", robot.tag)
     return robot
+
+
+def unexpanded(path: str) -> str:
+    """Return the problem of a file of xacro: the command that makes a URDF file of it."""
+    name = path.rpartition("/")[2]
+    out = name.removesuffix(XACRO).removesuffix(SUFFIX) + SUFFIX
+    command = f"xacro {name} > {out if out != name else 'robot' + SUFFIX}"
+    return f"a file of xacro, which makes a URDF file of it: {command}"
 
 
 def _macros(robot: Element) -> Iterator[Element]:
