@@ -17,7 +17,7 @@ export PYTHONDONTWRITEBYTECODE :=
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components machines lint page pictures bench compiled clean environment
+.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components corpus robots machines lint page pictures bench compiled clean environment
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim up)'
@@ -31,6 +31,7 @@ help:
 	@echo 'make stats   the links against their laws, at full size, by a seed that it prints (SEED=n repeats one)'
 	@echo 'make numbers the bits and errors of elementary functions, the statistics of noise, over millions of values'
 	@echo 'make components   each component type in a world of its own: the laws, by several seeds, and settings at their limits'
+	@echo 'make corpus  public robots of any size: each is read or refused as the table has it, and runs as proposed'
 	@echo 'make swarm-gate  for each planted bug, the first seed that finds it (ARGS: names, --seeds N, --jobs N)'
 	@echo 'make machines  further cuts between machines: needs root, see docs/how-to/testing.md'
 	@echo 'make lint    ruff and mypy alone'
@@ -77,11 +78,20 @@ numbers: environment
 components: environment
 	@$(PYTEST) -o timeout=0 -m campaign tests/components $(ARGS)
 
+corpus: robots
+	@$(PYTEST) -o timeout=0 -m 'campaign or not campaign' tests/corpus $(ARGS)
+
+# Public robots, 131 MB, once. Where they cannot be had, tests that read them are skipped; with CI set they fail.
+robots: environment
+	@$(PYTHON) -c 'from importlib.metadata import version; version("example-robot-data")' 2>/dev/null || \
+	PYTHONPATH= $(PYTHON) -m pip install --quiet --disable-pip-version-check \
+	"$$(sed -n 's/^corpus = \["\(.*\)"\]/\1/p' pyproject.toml)" || echo 'The tests run without public robots.'
+
 swarm-gate: environment
 	@$(PYTHON) -m tests.gate.search $(ARGS)
 
 # Last in it is pytest, so that its summary ends the output.
-test: lint
+test: lint robots
 	@$(PYTEST) --durations 20 $(ARGS)
 
 slow: environment

@@ -1,11 +1,12 @@
 """What foosim reads of public robots: `python -m tests.corpus.table` writes table.txt, which a test compares.
 
 Each line has a file by its place in its package, and what `foosim urdf` says of it: its links, the joints that move,
-its mass and how many notes it has; or why it is refused, by its first error.
+its mass, the base that it proposes and how many notes it has; or why it is refused, by its first error.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, distribution
@@ -15,12 +16,16 @@ from typing import Final
 from foosim.common.errors import Refused
 from foosim.deployment.assets import read_robot
 from foosim.world.bodies.urdf import SUFFIX, Robot
+from foosim.world.bodies.urdf_base import base_of
+from foosim.world.matter.mesh import MESH_SUFFIXES
 
 HERE: Final = Path(__file__).parent
 TABLE: Final = HERE / "table.txt"
+EXAMPLE: Final = "example-robot-data"
+PYBULLET: Final = "pybullet_data"
 PUBLIC: Final = {
-    "example-robot-data": ("example-robot-data", "cmeel.prefix/share/example-robot-data/robots"),
-    "pybullet_data": ("pybullet", "pybullet_data"),
+    EXAMPLE: (EXAMPLE, "cmeel.prefix/share/example-robot-data/robots"),
+    PYBULLET: ("pybullet", "pybullet_data"),
 }
 """Sets of robots on PyPI: the distribution that has each, and its folder among the installed packages."""
 OWN: Final = "files"
@@ -28,6 +33,9 @@ OWN: Final = "files"
 SETS: Final = (*PUBLIC, OWN)
 ALIKE: Final = "random_urdfs"
 """A folder of a thousand objects, of one form."""
+LIGHT_BYTES: Final = 2_000_000
+"""Most files name meshes of at most as many bytes; the others take minutes."""
+_MESH: Final = re.compile(r"""filename\s*=\s*["'][^"']*?([^"'/]+)["']""")
 
 
 def folder_of(which: str) -> Path | None:
@@ -42,10 +50,22 @@ def folder_of(which: str) -> Path | None:
     return folder if folder.is_dir() else None
 
 
-def lines_of(which: str, folder: Path) -> list[str]:
-    """Return the lines of a set."""
-    paths = sorted(path.relative_to(folder) for path in folder.rglob(f"*{SUFFIX}"))
-    return [f"{which}/{path.as_posix()}: {found(folder / path).replace(str(folder), which)}" for path in paths if path.parts[0] != ALIKE]
+def files_of(which: str, folder: Path, *, is_light: bool) -> dict[str, Path]:
+    """Return the light or heavy files of a set by their names in the table."""
+    sizes = {path.name: path.stat().st_size for path in folder.rglob("*") if path.suffix.lower() in MESH_SUFFIXES}
+    files = {}
+    for path in sorted(folder.rglob(f"*{SUFFIX}")):
+        names = set(_MESH.findall(path.read_text(encoding="utf-8", errors="replace")))
+        place = path.relative_to(folder)
+        if place.parts[0] != ALIKE and (sum(sizes.get(name, 0) for name in names) <= LIGHT_BYTES) == is_light:
+            files[f"{which}/{place.as_posix()}"] = path
+    return files
+
+
+def lines_of(which: str, folder: Path, *, is_light: bool) -> list[str]:
+    """Return the lines of the light or heavy files of a set."""
+    files = files_of(which, folder, is_light=is_light)
+    return [f"{name}: {found(file).replace(str(folder), which)}" for name, file in files.items()]
 
 
 def found(file: Path) -> str:
@@ -58,10 +78,10 @@ def found(file: Path) -> str:
 
 
 def described(robot: Robot) -> str:
-    """Return the links, the moving joints, the mass and the notes of a robot."""
+    """Return the links, the moving joints, the mass, the proposed base and the notes of a robot."""
     counts = ((len(robot.links), "link"), (len(robot.moving), "joint"), (len(robot.notes), "note"))
     links, joints, notes = (f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts)
-    return f"{links}, {joints}, {robot.mass:.4g} kg, {notes}"
+    return f"{links}, {joints}, {robot.mass:.4g} kg, {'fixed' if base_of(robot)[0] else 'free'}, {notes}"
 
 
 def table() -> dict[str, list[str]]:
@@ -77,7 +97,8 @@ def written() -> Iterator[str]:
         folder = folder_of(which)
         if folder is None:
             print(f"{which} is not installed: its lines stay", file=sys.stderr)
-        yield from before[which] if folder is None else lines_of(which, folder)
+        both = [] if folder is None else [lines_of(which, folder, is_light=is_light) for is_light in (True, False)]
+        yield from sorted([line for lines in both for line in lines]) if both else before[which]
         yield ""
 
 
