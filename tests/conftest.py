@@ -23,7 +23,7 @@ import foosim.protocol.hub_messages
 import foosim.protocol.messages
 import foosim.protocol.replay_messages  # noqa: F401  # all messages
 from foosim.cli import main
-from foosim.common.errors import DeploymentError
+from foosim.common.errors import Refused
 from foosim.common.struct_types import Message
 from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
@@ -99,7 +99,7 @@ def pytest_runtest_setup() -> Generator[None, object, object]:
     """A test that needs the engine of tables is skipped where there is none, with the reason."""
     try:
         return (yield)
-    except DeploymentError as error:
+    except Refused as error:
         if not NO_BULLET or NO_BULLET not in str(error):
             raise
         pytest.skip(NO_BULLET)
