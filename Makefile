@@ -17,7 +17,7 @@ export PYTHONDONTWRITEBYTECODE :=
 WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components corpus robots machines lint page pictures bench compiled clean environment
+.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components corpus robots machines lint page pictures bench compiled clean environment checks second
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim up)'
@@ -37,6 +37,7 @@ help:
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make page    lint and type check the page of the console, and bundle it into console/www: needs npm'
 	@echo 'make pictures  the pictures of the docs, from runs in Chromium: needs chromium (ARGS: names of pictures)'
+	@echo 'make second  the part of the tests that takes a minute, on the newest Python of 3.12 to 3.14 that is found'
 	@echo 'make compiled  .venv-compiled: foosim with its hot path compiled, as pip installs it where a C compiler is'
 	@echo 'make bench   measure speed, latency and throughput of that (ARGS: options of the bench)'
 	@echo 'make clean   remove environments, caches and builds; captures stay'
@@ -91,8 +92,23 @@ swarm-gate: environment
 	@$(PYTHON) -m tests.gate.search $(ARGS)
 
 # Last in it is pytest, so that its summary ends the output.
-test: lint robots
+test: $(if $(CI),checks,lint) robots
 	@$(PYTEST) --durations 20 $(ARGS)
+
+# The type checker has one core, the second Python the other.
+checks: environment
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target lint second
+
+# What says the most in half a minute of processor time: numbers, frames, islands, clients, deployments, the world on 1 and
+# on 3 nodes with losses, its capture simulated and judged again, commands as typed, processes.
+LAW := tests/laws/test_one_world.py::test_nodes_moves_losses_and_a_bad_bus_give_the_same_world
+SECOND := tests/common tests/client/test_core.py tests/client/test_jobs.py tests/client/test_player.py \
+	tests/runtime/test_loop.py tests/runtime/test_journal.py tests/runtime/test_process.py \
+	tests/deployment/test_yaml.py tests/deployment/test_engine_lacks.py tests/cli/test_yard.py \
+	tests/world/test_frame.py tests/world/test_islands.py tests/world/test_urdf_model.py \
+	tests/laws/test_island_engines.py tests/physics/test_rigid_drive.py '$(LAW)[7_0-workshop]' '$(LAW)[7_0-living]'
+second: environment
+	@sh tools/second.sh $(SECOND)
 
 slow: environment
 	@$(PYTEST) --slow-start 7 --load $$(nproc) tests/wire $(ARGS)
@@ -123,5 +139,5 @@ environment:
 	@sh tools/environment.sh
 
 clean:
-	rm -rf .venv .venv-uv .venv-compiled .typecheck .page .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
+	rm -rf .venv .venv-uv .venv-second .venv-compiled .typecheck .page .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
 	find $(wildcard $(PACKAGES) tests bench) -type d -name __pycache__ -prune -exec rm -rf {} +

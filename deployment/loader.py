@@ -19,7 +19,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from foosim.common import limits
-from foosim.common.errors import DeploymentError, describe
+from foosim.common.errors import ABSENT, DeploymentError, describe
 from foosim.common.finding import Finding
 from foosim.deployment.components import read_components
 from foosim.deployment.network.link_settings import Profiles
@@ -220,6 +220,16 @@ def check_complete(text: Text, name: str, deployment: Deployment) -> None:
     for _, stage in stages(deployment, with_files=True):
         found = chain.from_iterable(check.find(deployment, ends) for check in stage)
         refuse_findings(text, name, list(islice(found, PROBLEMS_MAX + 1)))
+
+
+def check_engine(text: Text, name: str, deployment: Deployment) -> None:
+    """Refuse an engine that cannot be built on this machine.
+
+    `text` and `name` are what the deployment was loaded from. Raises DeploymentError.
+    """
+    engine = deployment.engine_type
+    if lack := engine.lack:
+        refuse_findings(text, name, [Finding(("engine",), f"{lack}: {engine.instead}", ABSENT)])
 
 
 def refuse_findings(text: Text, name: str, findings: Sequence[Finding], sets: Sequence[str] = ()) -> None:

@@ -67,7 +67,8 @@ HERE: Final = "here"
 PLACEMENT: Final = "placement"
 TIME_ERROR: Final = 5
 """Result of `adjtimex` for an unsynchronized clock."""
-PYTHON_TESTED: Final = (3, 11)
+PYTHONS: Final = ((3, 11), (3, 14))
+"""The first and the last version of Python that foosim supports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,11 +145,11 @@ def _versions(case: Case) -> Iterator[_Row]:
     """Versions of foosim, Python and each library against the requirements; whether the hot path is compiled."""
     yield "foosim", "fine", f"{importlib.metadata.version('foosim')}, protocol {limits.PROTOCOL_VERSION}", ""
     python = platform.python_version()
-    if sys.version_info[:2] == PYTHON_TESTED:
+    if PYTHONS[0] <= sys.version_info[:2] <= PYTHONS[1]:
         yield "python", "fine", python, ""
     else:
-        tested = ".".join(map(str, PYTHON_TESTED))
-        yield "python", "warning", f"{python}; foosim is tested with {tested}", f"install Python {tested}"
+        first, last = (".".join(map(str, version)) for version in PYTHONS)
+        yield "python", "warning", f"{python}; foosim supports {first} to {last}", f"install Python {last}"
     slower = "interpreted: the same bits, more slowly; installed by pip, where there is a C compiler, it is compiled"
     yield "hot path", "fine", "compiled" if is_compiled() else slower, ""
     for line in importlib.metadata.requires("foosim") or ():
@@ -165,6 +166,14 @@ def _library(wanted: Requirement) -> _Row:
     if not wanted.specifier.contains(found, prereleases=True):
         return wanted.name, "problem", f"{found} is not {wanted.specifier}", f"pip install '{wanted}'"
     return wanted.name, "fine", found, ""
+
+
+def _engine(case: Case) -> Iterator[_Row]:
+    """Whether the engine of the deployment's nodes on this machine can be built."""
+    deployment, hosts = case.deployment, places(case.deployment)
+    if any(hosts.get(node) == case.host for node in deployment.nodes):
+        engine = deployment.engine_type
+        yield engine.name, "problem" if engine.lack else "fine", engine.lack, engine.instead if engine.lack else ""
 
 
 def _arithmetic(case: Case) -> Iterator[_Row]:
@@ -332,6 +341,7 @@ def _players(case: Case) -> Iterator[_Row]:
 CHECKS: Final[dict[str, Callable[[Case], Iterator[_Row]]]] = {
     "processes": _processes,
     "versions": _versions,
+    "engine": _engine,
     "arithmetic": _arithmetic,
     "command": _commands,
     "players": _players,

@@ -18,7 +18,7 @@ from foosim.common.errors import BadValue, Refused, read_at
 from foosim.common.finding import Finding
 from foosim.common.units import Pace, parse_ns, parse_pace
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.loader import apply_sets, load_deployment, refuse_findings
+from foosim.deployment.loader import apply_sets, check_engine, load_deployment, refuse_findings
 from foosim.deployment.processes import Process, parse_shape, processes_of
 from foosim.deployment.schema import VHUB, Capture, Deployment, places
 from foosim.deployment.text.files import read_source_file
@@ -140,6 +140,8 @@ def make_plan(options: RunOptions) -> Plan:
     text = apply_sets(read_source_file(options.file), name, options.all_sets)
     text, files = pin_assets(text, name, options.file.parent)
     deployment = load_deployment(text, name).with_assets(files)
+    if not places(deployment).keys() >= deployment.nodes.keys():
+        check_engine(text, name, deployment)  # a node on another machine says itself what that lacks
     has_meshes = any(isinstance(thing, SceneryMesh) for thing in deployment.scenery.values())
     if has_meshes or build_layout(deployment).couples:
         from foosim.node.physics.mesh_trial import check_shapes

@@ -133,6 +133,8 @@ class Member:
             deployment = load_deployment(build.deployment, build.deployment_name)
         except DeploymentError as error:
             raise self._invalid(build, f"the deployment is not valid on its machine: {error.problems[0]}") from None
+        if self.role == "node" and (lack := deployment.engine_type.lack):
+            raise self._invalid(build, f"its machine cannot compute the run: {lack}")
         if not deployment.lacks_files:  # else when they have come
             build_layout(deployment)
         self._coming = build, deployment, Fetching(deployment, self._files)

@@ -123,7 +123,12 @@ def verify(about: About, ticks: Iterable[CapturedTick], nodes: int = 1, start: S
 
 
 def captured_world(about: About, deployment: Deployment, frame: Frame, nodes: int = 1) -> SteppedWorld:
-    """Return a capture's world at a frame, on `nodes` nodes. Raises AssetError for a file of an unfit model."""
+    """Return a capture's world at a frame, on `nodes` nodes.
+
+    Raises CaptureError for an engine that this machine lacks, AssetError for a file of an unfit model.
+    """
+    if lack := deployment.engine_type.lack:
+        raise CaptureError(f"the run cannot be computed again here: {lack}")
     check_shapes(deployment, about.deployment_name, about.deployment_text)
     return SteppedWorld(deployment, frame, deal_robots(deployment, nodes))
 

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Generator, Iterator
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import msgspec
 import pytest
@@ -23,11 +23,13 @@ import foosim.protocol.hub_messages
 import foosim.protocol.messages
 import foosim.protocol.replay_messages  # noqa: F401  # all messages
 from foosim.cli import main
+from foosim.common.errors import Refused
 from foosim.common.struct_types import Message
 from foosim.deployment.loader import apply_sets, expanded_text
 from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.runtime import GC_THRESHOLDS
 from foosim.world.component_types import registry
+from foosim.world.component_types.descriptions import ENGINES
 from tests.meter import Burden, Meter, measured_seconds, scope_of
 
 settings.register_profile(
@@ -86,6 +88,24 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
         gc.enable()
+
+
+NO_BULLET: Final = ENGINES["bullet"].lack
+"""What the engine of tables lacks where the tests run, if anything: on a Python after 3.11 a module."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup() -> Generator[None, object, object]:
+    """A test that needs the engine of tables is skipped where there is none, with the reason."""
+    try:
+        return (yield)
+    except Refused as error:
+        if not NO_BULLET or NO_BULLET not in str(error):
+            raise
+        pytest.skip(NO_BULLET)
+
+
+pytest_runtest_call = pytest_runtest_setup
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -2,10 +2,11 @@
 # Makes the environment that everything in this repository runs in: .venv, with Python 3.11 and the packages that
 # pyproject.toml names. `make` calls it before each of its targets; it returns at once when .venv is up to date.
 #
-# Python 3.11 is the one found on PATH. Where there is none, any other Python 3 installs uv into .venv-uv, and uv
-# fetches a Python 3.11 into the same folder. Nothing outside the repository is touched.
+# Python 3.11 is the one found on PATH, or among pyenv's versions. Where there is none, any other Python 3 installs uv
+# into .venv-uv, and uv fetches a Python 3.11 into the same folder. Nothing outside the repository is touched.
 set -eu
 cd "$(dirname "$0")/.."
+. tools/python_where.sh
 
 # Both would mix other installations into ours.
 unset PYTHONPATH PYTHONHOME
@@ -15,28 +16,6 @@ export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1
 key() {
     pwd
     cat pyproject.toml
-}
-
-# The first Python on PATH that satisfies a condition over `v`, its version. It must really run (pyenv leaves commands
-# on PATH that only print an error) and be able to make environments (Debian packs ensurepip apart from Python). The
-# environment that is replaced is none: it may be the one that is active.
-python_where() {
-    (
-        IFS=:
-        for folder in $PATH; do
-            case $folder in "$PWD"/.venv/*) continue ;; esac
-            for name in python3.11 python3 python3.14 python3.13 python3.12 python3.10 python3.9 python; do
-                if [ -x "$folder/$name" ] && "$folder/$name" -c "
-import sys, ensurepip, venv
-v = sys.version_info[:2]
-sys.exit(not ($1 and sys.implementation.name == 'cpython'))" >/dev/null 2>&1; then
-                    echo "$folder/$name"
-                    exit 0
-                fi
-            done
-        done
-        exit 1
-    )
 }
 
 # A Python 3.11 that uv fetches; its path is the output, all else goes to standard error.
@@ -84,9 +63,13 @@ rm -rf .venv
 step "making the environment"
 "$python" -m venv .venv
 # What pip is at, with or without a terminal; all that it says is in .venv/setup.log.
+# Here setuptools builds foosim: pip would else install mypy once more, for that alone. What no test imports stays
+# uncompiled, which is most of what is installed.
 step "finding out which packages are needed"
 (
-    .venv/bin/python -m pip install --progress-bar off --editable '.[dev]' 2>&1 && touch .venv/installed
+    .venv/bin/python -m pip install --progress-bar off 'setuptools>=77' 2>&1 &&
+        .venv/bin/python -m pip install --progress-bar off --no-compile --no-build-isolation --editable '.[dev]' 2>&1 &&
+        touch .venv/installed
 ) | tee .venv/setup.log | {
     found=0
     while IFS= read -r line; do

@@ -22,7 +22,7 @@ from foosim.common import units
 from foosim.common.errors import BadValue, Failed, UnknownName, read_at
 from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
-from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.loader import apply_sets, check_engine, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.runtime.command import DONE, FAILED, INTERRUPTED, REFUSED, JsonOption, new_app, print_json
 from foosim.simulation.match.figures import draw, figures
@@ -110,6 +110,7 @@ def _checked(options: MatchOptions) -> Match:
     text = apply_sets(read_source_file(options.deployment), name, options.sets)
     text, files = pin_assets(text, name, options.deployment.parent)
     deployment = load_deployment(text, name).with_assets(files)
+    check_engine(text, name, deployment)
     first, second = seats(deployment, name)
     ticks = max(1, round(options.minutes * 60e9 / deployment.tick_ns))
     classes = entrants[0].path, entrants[1].path

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from foosim.common.errors import Failed
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import AnyEngine
 from foosim.world.component_types import registry
@@ -36,7 +37,9 @@ def has_rigid(layout: Layout) -> bool:
 
 
 def engine_of(deployment: Deployment, layout: Layout) -> AnyEngine:
-    """Return the engine that a deployment names, built at once."""
+    """Return the engine that a deployment names, built at once. Raises Failed for one that this machine lacks."""
+    if lack := deployment.engine_type.lack:
+        raise Failed(f"{lack}: {deployment.engine_type.instead}")
     engine: AnyEngine = registry.class_at(deployment.engine_type.path)(deployment, layout)
     return engine
 

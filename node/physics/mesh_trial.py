@@ -21,7 +21,7 @@ from math import isfinite
 from typing import Final
 
 import foosim.world.mesh_files  # noqa: F401  # before the limits: the trial can open no file
-from foosim.deployment.loader import load_deployment
+from foosim.deployment.loader import check_engine, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.node.physics.interface import Engine, IslandEngine
 from foosim.node.physics.making import engine_of, make_engine
@@ -45,10 +45,11 @@ COMMAND: Final = (sys.executable, "-P", "-m", "foosim.node.physics.mesh_trial")
 
 
 def check_shapes(deployment: Deployment, name: str, text: str) -> None:
-    """Try the files of a deployment with its engine: meshes of scenery, and bodies. Files must have been read.
+    """Try the engine of a deployment, and its files: meshes of scenery, and bodies. Files must have been read.
 
-    `text` is that of the deployment. Raises AssetError.
+    `text` is that of the deployment. Raises AssetError, and DeploymentError for an engine that this machine lacks.
     """
+    check_engine(text, name, deployment)
     layout = build_layout(deployment)
     if layout.couples:
         make_engine(deployment, layout).close()

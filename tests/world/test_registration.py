@@ -118,8 +118,8 @@ SLOTS: Final = {
     "B = slot()": f"'B': {NAME}",
     "samples = slot()": "each sensor has a slot samples already",
     "a = slot(lambda settings, carrier: '1')": "slots are wrong: a has 1 to 65536 numbers, or ENTITY, not '1', 'own'",
-    "a = slot(lambda settings, carrier: 1 // 0)": "its slots failed: ZeroDivisionError: integer division or modulo by "
-    "zero (own_form.py:LINE), 'own'",
+    "a = slot(lambda settings, carrier: 1 / 0)": "its slots failed: ZeroDivisionError: division by zero "
+    "(own_form.py:LINE), 'own'",
     "a = slot(refuse)": "more than can be kept, '3 s'",
 }
 """Declarations of a class, and their problem."""
@@ -143,11 +143,11 @@ def test_slots_are_checked_and_sizes_follow_from_settings(site: Path, slots: str
 
 def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
     written(
-        site, "Own.check = staticmethod(lambda settings, numbers: 1 // 0)", "modifier('own', ModifierSettings)(Own)"
+        site, "Own.check = staticmethod(lambda settings, numbers: 1 / 0)", "modifier('own', ModifierSettings)(Own)"
     )
     (problem,) = problems("robots.red.goal.sensors.encoder.modifiers=[{kind: 'own_form:Own'}]")
     line = len((site / "own_form.py").read_text().splitlines()) - 1
-    why = f"ZeroDivisionError: integer division or modulo by zero (own_form.py:{line})"
+    why = f"ZeroDivisionError: division by zero (own_form.py:{line})"
     assert problem.endswith(f"modifiers[0]: its check fails: {why}, 'own_form:Own'")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -381,7 +382,8 @@ class Engine:
 
     `meshes`: it has scenery of triangles. `islands`: it has bodies of any kind, and solves islands one after the other
     (`IslandEngine`); any other has rods and balls of a table. `grasps`: it holds two bodies together by
-    `Island.welds`.
+    `Island.welds`. `needs`: a module that not every installation has; `where` says which have it, and `instead` what
+    to set without it.
     """
 
     name: str
@@ -389,6 +391,16 @@ class Engine:
     meshes: bool = False
     islands: bool = False
     grasps: bool = False
+    needs: str = ""
+    where: str = ""
+    instead: str = ""
+
+    @property
+    def lack(self) -> str:
+        """What it lacks on this machine, in words; empty where it can be built."""
+        if not self.needs or find_spec(self.needs) is not None:
+            return ""
+        return f"the engine {self.name} needs {self.needs}, which {self.where}"
 
     @property
     def bodies(self) -> str:
@@ -397,7 +409,15 @@ class Engine:
 
 
 ENGINES: Final[dict[str, Engine]] = {
-    "bullet": Engine("bullet", "foosim.node.physics.bullet_engine:BulletEngine", meshes=True),
+    "bullet": Engine(
+        "bullet",
+        "foosim.node.physics.bullet_engine:BulletEngine",
+        meshes=True,
+        needs="pybullet",
+        where="has wheels for Python 3.11 alone",
+        instead="set engine: pure, or use Python 3.11; pure resolves contacts one after the other, has no meshes, and "
+        "computes a close world with other digests",
+    ),
     "mujoco": Engine(
         "mujoco", "foosim.node.physics.mujoco_islands:MujocoIslands", meshes=True, islands=True, grasps=True
     ),
