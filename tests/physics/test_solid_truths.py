@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import repeat
 from math import cos, pi, sin, sqrt
 from pathlib import Path
 from random import Random
@@ -277,7 +278,7 @@ def test_a_body_from_a_file_keeps_its_angular_momentum(case: int) -> None:
     ball_at = '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
     text = f'<robot name="r"><link name="l">{mass}{ball_at}</link></robot>'.encode()
     robot = read_urdf("r.urdf", {"r.urdf": text})
-    body = body_of(robot, "r", ORIGIN, UPRIGHT, fixed=False, surface="default", speed_limit=50.0)
+    body = body_of(robot, "r", ORIGIN, UPRIGHT, fixed=False, surfaces=repeat("default"), speed_limit=50.0)
     spin = tuple(draw(460 + 10 * case + axis, -3.0, 3.0) for axis in range(3))
 
     def momentum(one: Solids) -> list[float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hashlib import blake2b
-from itertools import permutations
+from itertools import permutations, repeat
 from math import pi
 from struct import pack
 from typing import Final
@@ -157,7 +157,7 @@ def bits_of_inertias() -> str:
     """Digest of moments and axes of each link, and of all of them as one body."""
     urdf._read.cache_clear()
     robot = urdf.read_urdf("boxes.urdf", {"boxes.urdf": robot_of_boxes()})
-    whole = urdf.body_of(robot, "boxes", ORIGIN, UPRIGHT, fixed=False, surface="", speed_limit=1.0).links[0]
+    whole = urdf.body_of(robot, "boxes", ORIGIN, UPRIGHT, fixed=False, surfaces=repeat(""), speed_limit=1.0).links[0]
     numbers = [number for link in (*robot.links, whole) for number in (*link.inertia, *link.principal)]
     return blake2b(pack(f"<{len(numbers)}d", *numbers), digest_size=8).hexdigest()
 

@@ -142,9 +142,7 @@ def test_slots_are_checked_and_sizes_follow_from_settings(site: Path, slots: str
 
 
 def test_a_check_that_fails_is_a_problem_of_the_modifier(site: Path) -> None:
-    written(
-        site, "Own.check = staticmethod(lambda settings, numbers: 1 / 0)", "modifier('own', ModifierSettings)(Own)"
-    )
+    written(site, "Own.check = staticmethod(lambda settings, numbers: 1 / 0)", "modifier('own', ModifierSettings)(Own)")
     (problem,) = problems("robots.red.goal.sensors.encoder.modifiers=[{kind: 'own_form:Own'}]")
     line = len((site / "own_form.py").read_text().splitlines()) - 1
     why = f"ZeroDivisionError: division by zero (own_form.py:{line})"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import repeat
 from math import cos, pi, sin, sqrt
 from pathlib import Path
 from typing import Any, Final
@@ -224,7 +225,7 @@ def test_links_are_where_bullet_has_them_at_drawn_joints(name: str, fixed: bool,
     orientation = from_rpy(0.2, 0.5, -2.0)
     about_it = {"useFixedBase": fixed, "basePosition": position, "baseOrientation": orientation}
     bullet, numbers = loaded(client, tmp_path, robot, text, **about_it)
-    body = body_of(robot, "arm-1", position, orientation, fixed=fixed, surface="grip", speed_limit=5.0)
+    body = body_of(robot, "arm-1", position, orientation, fixed=fixed, surfaces=repeat("grip"), speed_limit=5.0)
     entity, state = entity_of(body)
     if not fixed:
         at, turn = start_of(body, position, orientation)
@@ -254,7 +255,7 @@ def test_links_are_where_bullet_has_them_at_drawn_joints(name: str, fixed: bool,
 
 def test_a_free_robot_stands_where_it_is_placed_by_its_first_links_frame() -> None:
     robot = askew()
-    body = body_of(robot, "r", ORIGIN, UPRIGHT, fixed=False, surface="grip", speed_limit=5.0)
+    body = body_of(robot, "r", ORIGIN, UPRIGHT, fixed=False, surfaces=repeat("grip"), speed_limit=5.0)
     assert (
         body.is_free
         and body.speed_limit == 5.0
@@ -281,7 +282,7 @@ FOOTPRINT: Final = f"""<robot name="cart">
 
 def test_a_free_first_link_without_a_mass_has_that_of_what_is_fixed_to_it() -> None:
     robot = read_urdf("cart.urdf", {"cart.urdf": FOOTPRINT.encode()})
-    body = body_of(robot, "cart", ORIGIN, UPRIGHT, fixed=False, surface="s", speed_limit=1.0)
+    body = body_of(robot, "cart", ORIGIN, UPRIGHT, fixed=False, surfaces=repeat("s"), speed_limit=1.0)
     parts = [
         MassOf(4.0, (0.1, 0.0, 0.2), (1.0, 0.0, 0.0, 2.0, 0.0, 2.5)),
         MassOf(1.0, (0.0, 0.0, 1.2), (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)),
@@ -291,7 +292,7 @@ def test_a_free_first_link_without_a_mass_has_that_of_what_is_fixed_to_it() -> N
     assert (first.mass, hull.mass, mast.mass) == (5.0, 0.0, 0.0)
     assert first.centre_of_mass == pytest.approx(whole.centre) and tensor_of(first) == pytest.approx(whole.tensor)
     assert hull.shapes and hull.joint == mast.joint == "fixed", "shapes and names stay where they are"
-    fixed = body_of(robot, "cart", ORIGIN, UPRIGHT, fixed=True, surface="s")
+    fixed = body_of(robot, "cart", ORIGIN, UPRIGHT, fixed=True, surfaces=repeat("s"))
     assert [link.mass for link in fixed.links] == [0.0, 4.0, 1.0]
 
 
@@ -301,7 +302,7 @@ def test_the_arm_has_seven_joints_and_a_frame_to_grip_with() -> None:
     assert all(link.joint == "revolute" for link in robot.links if link.joint in MOVING)
     assert all(link.effort > 0 and link.speed > 0 and link.limits[0] < 0 < link.limits[1] for link in robot.links[1:8])
     assert robot.mass == pytest.approx(14.9)
-    body = body_of(robot, "arm", ORIGIN, UPRIGHT, fixed=True, surface="arm")
+    body = body_of(robot, "arm", ORIGIN, UPRIGHT, fixed=True, surfaces=repeat("arm"))
     entity, state = entity_of(body)
     assert forward_kinematics(body, entity, state)[-1][1] == pytest.approx((0.0, 0.0, 1.13))
     # Each shoulder can hold the arm stretched out: torque of all that is beyond, against effort.
@@ -517,5 +518,5 @@ def test_whatever_is_changed_in_a_good_file_is_read_or_refused() -> None:
                 assert str(error).startswith("robots/r.urdf:")
                 refused += 1
             else:
-                body_of(robot, "r", ORIGIN, UPRIGHT, fixed=True, surface="")
+                body_of(robot, "r", ORIGIN, UPRIGHT, fixed=True, surfaces=repeat(""))
     assert 500 < refused < 1000

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import closing
+from itertools import repeat
 from typing import Final
 
 import numpy as np
@@ -213,7 +214,7 @@ def test_shapes_have_shares_of_a_mass_by_their_volumes() -> None:
 def test_moments_that_a_file_has_rounded_up_are_computed(fixed: bool) -> None:
     plate = inertial("1", ixx="0.083", iyy="0.083", izz="0.167") + BALL
     robot = read(link("a", plate), link("b", plate), joint("j", "ab"))
-    body = body_of(robot, "r", (0.0, 0.0, 2.0), UPRIGHT, fixed=fixed, surface="default", speed_limit=9.0)
+    body = body_of(robot, "r", (0.0, 0.0, 2.0), UPRIGHT, fixed=fixed, surfaces=repeat("default"), speed_limit=9.0)
     assert robot.notes == () and [one.inertia for one in body.links] == [(0.083, 0.083, 0.166)] * 2
     with closing(Solids([body])) as one:  # MuJoCo refuses others
         one.run(1)
@@ -248,7 +249,7 @@ def test_links_without_a_mass_between_joints_and_at_their_end_borrow_some() -> N
 
 def test_a_robot_with_links_without_a_mass_moves_as_its_heavy_ones_do() -> None:
     """500 N at 10 kg; all of its motors reach their speeds, and hold still against gravity."""
-    body = body_of(read(*SLIDER), "r", (0.0, 0.0, 2.0), UPRIGHT, fixed=True, surface="default")
+    body = body_of(read(*SLIDER), "r", (0.0, 0.0, 2.0), UPRIGHT, fixed=True, surfaces=repeat("default"))
     with closing(Solids([body], feel=physics())) as one:
         one.drives["r"] = Drives((Motor(100.0, 500.0), *(Motor(0.0, 50.0),) * 4))
         one.run(2)
@@ -264,7 +265,7 @@ def test_a_robot_with_links_without_a_mass_moves_as_its_heavy_ones_do() -> None:
 
 
 def test_a_fixed_robot_without_any_mass_carries_others() -> None:
-    table = body_of(read(link("a", BALL)), "t", (0.0, 0.0, 2.0), UPRIGHT, fixed=True, surface="default")
+    table = body_of(read(link("a", BALL)), "t", (0.0, 0.0, 2.0), UPRIGHT, fixed=True, surfaces=repeat("default"))
     with closing(Solids([box("b", (0.1, 0.1, 0.1), 1.0), table], feel=physics())) as one:
         one.put("b", (0.0, 0.0, 2.2))
         one.run(50)

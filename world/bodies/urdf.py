@@ -10,7 +10,7 @@ newer tools of ROS share.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -293,7 +293,7 @@ def body_of(
     orientation: Quaternion,
     *,
     fixed: bool,
-    surfaces: Sequence[str],
+    surfaces: Iterable[str],
     speed_limit: float = 0.0,
 ) -> Body:
     """Return a robot as the body `name`, the frame of its first link at this pose; its links are `name/LINK`, with the
@@ -304,7 +304,7 @@ def body_of(
     """
     links = [
         replace(link, name=f"{name}/{link.name}", shapes=_with(link.shapes, surface))
-        for link, surface in zip(robot.links, surfaces, strict=True)
+        for link, surface in zip(robot.links, surfaces, strict=False)
     ]
     if fixed:
         return Body(name, "urdf", position, tuple(links), orientation=orientation, antenna_link=0)
