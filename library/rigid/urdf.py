@@ -12,7 +12,17 @@ from foosim.common import units
 from foosim.common.errors import BadValue
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.world.bodies.urdf import SUFFIX, Robot, body_of, free_base_problem, meshes_of, read_urdf, start_of
+from foosim.world.bodies.urdf import (
+    SUFFIX,
+    XACRO,
+    Robot,
+    body_of,
+    free_base_problem,
+    meshes_of,
+    read_urdf,
+    start_of,
+    unexpanded,
+)
 from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
@@ -25,6 +35,8 @@ from foosim.world.spec import WorldSpec
 
 
 def _urdf_path(path: str) -> str:
+    if path.endswith(XACRO):
+        raise custom_error(BadValue(unexpanded(path)))
     if not path.endswith(SUFFIX):
         raise custom_error(BadValue(f"no URDF file, which ends with {SUFFIX}", path))
     return path

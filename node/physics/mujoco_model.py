@@ -101,8 +101,8 @@ mujoco.set_mju_user_warning(_warned)  # by default MuJoCo writes MUJOCO_LOG.TXT 
 
 
 def is_mover(body: Body) -> bool:
-    """Whether a body has no mass: others are pushed by it, and it is moved by none."""
-    return all(link.mass == 0.0 for link in body.links)
+    """Whether a free body has no mass: others are pushed by it, and it is moved by none."""
+    return body.is_free and all(link.mass == 0.0 for link in body.links)
 
 
 class Placed:

@@ -27,6 +27,7 @@ from foosim.world.bodies.inertia import (
     quaternion_of,
     solid,
     turned,
+    without_rounding,
 )
 from foosim.world.scene import ORIGIN, UPRIGHT, Box, Capsule, Cylinder, Hull, Sphere, Vector, from_rpy, rotate, turn
 
@@ -123,6 +124,7 @@ def test_away_from_the_centre_a_mass_resists_more() -> None:
 def test_a_thin_plate_whose_numbers_were_rounded_is_a_body() -> None:
     check_moments(1.0, (1.0, 1.0, 2.0))
     check_moments(1.0, (0.083, 0.083, 0.167))
+    assert without_rounding((0.083, 0.167, 0.083)) == (0.083, 0.166, 0.083) and without_rounding((3, 4, 5)) == (3, 4, 5)
 
 
 # --- the same bits everywhere ----------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content
 from foosim.world.components.drives import Drives, Motor
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.scene import ORIGIN, UPRIGHT, Box, Mimic, Shape, Sphere, from_rpy
-from tests.solids import Solids, physics
+from tests.solids import Solids, box, physics
 
 MASS: Final = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>'
 BALL: Final = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
@@ -209,6 +209,16 @@ def test_shapes_have_shares_of_a_mass_by_their_volumes() -> None:
     assert alone.tensor == pytest.approx(turned(solid(box.geometry, 3.0).tensor, box.orientation))
 
 
+@pytest.mark.parametrize("fixed", [True, False])
+def test_moments_that_a_file_has_rounded_up_are_computed(fixed: bool) -> None:
+    plate = inertial("1", ixx="0.083", iyy="0.083", izz="0.167") + BALL
+    robot = read(link("a", plate), link("b", plate), joint("j", "ab"))
+    body = body_of(robot, "r", (0.0, 0.0, 2.0), UPRIGHT, fixed=fixed, surface="default", speed_limit=9.0)
+    assert robot.notes == () and [one.inertia for one in body.links] == [(0.083, 0.083, 0.166)] * 2
+    with closing(Solids([body])) as one:  # MuJoCo refuses others
+        one.run(1)
+
+
 SLIDER: Final = (
     link("w", ""),
     link("x", ""),
@@ -251,6 +261,14 @@ def test_a_robot_with_links_without_a_mass_moves_as_its_heavy_ones_do() -> None:
         before = one.get("r", "joint_positions")
         one.run(100)
         assert one.get("r", "joint_positions") == pytest.approx(before, abs=1e-5)
+
+
+def test_a_fixed_robot_without_any_mass_carries_others() -> None:
+    table = body_of(read(link("a", BALL)), "t", (0.0, 0.0, 2.0), UPRIGHT, fixed=True, surface="default")
+    with closing(Solids([box("b", (0.1, 0.1, 0.1), 1.0), table], feel=physics())) as one:
+        one.put("b", (0.0, 0.0, 2.2))
+        one.run(50)
+        assert one.get("b", "position") == pytest.approx([0.0, 0.0, 2.2], abs=1e-3)
 
 
 def test_a_joint_in_a_robot_without_any_mass_moves_nothing() -> None:

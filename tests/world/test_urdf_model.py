@@ -152,6 +152,10 @@ def test_a_bad_file_is_refused_at_planning(folder: Path, file: str, what: str) -
     [
         ("robots.arm.file=../arm.urdf", "a path inside the asset folder has no empty component"),
         ("robots.arm.file=models/arm.sdf", "no URDF file, which ends with .urdf, 'models/arm.sdf'"),
+        (
+            "robots.arm.file=a/b.urdf.xacro",
+            r"a file of xacro, which makes a URDF file .*: xacro b\.urdf\.xacro > b\.urdf",
+        ),
         ("robots.arm.fixed=", "robots.arm.fixed: "),
     ],
 )

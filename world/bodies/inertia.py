@@ -223,6 +223,12 @@ def check_moments(mass: float, moments: Vector) -> None:
             raise BadValue(f"{shown} of {mass:g} kg: a radius of gyration of {radius:g} m, {valid}")
 
 
+def without_rounding(moments: Vector) -> Vector:
+    """Return moments of which the largest, rounded up in its file, is at most the sum of both others, as in MuJoCo."""
+    x, y, z = moments
+    return min(x, y + z), min(y, x + z), min(z, x + y)
+
+
 # --- solid bodies ----------------------------------------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ from functools import lru_cache
 from typing import Final
 
 from foosim.world.bodies.findings import Findings
-from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of
+from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of, without_rounding
 from foosim.world.bodies.urdf_joints import Following, JointPart, Tree, followers_of, in_tree, read_joint
 from foosim.world.bodies.urdf_links import LinkPart, mesh_path, meshes_in, read_link
 from foosim.world.bodies.urdf_masses import with_masses
@@ -25,6 +25,7 @@ from foosim.world.bodies.xml_tree import BadElement, Element, read_xml
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Mimic, Quaternion, Shape, Vector, multiply, rotate
 
 SUFFIX: Final = ".urdf"
+XACRO: Final = ".xacro"
 SHAPES_MAX: Final = 256
 """Of collision: pairs of shapes that may touch are listed, and their count grows with its square."""
 KEPT: Final = 32
@@ -138,14 +139,19 @@ def _read(path: str, content: bytes, meshes: tuple[tuple[str, bytes], ...]) -> R
 def _robot_of(path: str, content: bytes) -> Element:
     robot = read_xml(path, content)
     macro = next(_macros(robot), None)
-    if macro is not None or path.endswith(".xacro"):
-        name = path.rpartition("/")[2]
-        out = name.removesuffix(".xacro").removesuffix(SUFFIX) + SUFFIX
-        expand = f"xacro {name} > {out if out != name else 'robot' + SUFFIX}"
-        raise (macro or robot).error(f"a file of xacro, which makes a URDF file of it: {expand}")
+    if macro is not None or path.endswith(XACRO):
+        raise (macro or robot).error(unexpanded(path))
     if robot.tag != "robot":
         raise robot.error("no URDF: the outermost element is robot", robot.tag)
     return robot
+
+
+def unexpanded(path: str) -> str:
+    """Return the problem of a file of xacro: the command that makes a URDF file of it."""
+    name = path.rpartition("/")[2]
+    out = name.removesuffix(XACRO).removesuffix(SUFFIX) + SUFFIX
+    command = f"xacro {name} > {out if out != name else 'robot' + SUFFIX}"
+    return f"a file of xacro, which makes a URDF file of it: {command}"
 
 
 def _macros(robot: Element) -> Iterator[Element]:
@@ -227,10 +233,10 @@ def _link(
         link.name,
         "fixed",
         link.shapes,
-        link.mass.mass,
-        link.moments,
-        link.mass.centre,
-        principal=link.principal,
+        link.mass,
+        link.inertia.moments,
+        link.centre_of_mass,
+        principal=link.inertia.axes,
         visuals=link.visuals,
     )
     if joint is None:
@@ -353,10 +359,11 @@ def _with_base_mass(robot: Robot, links: list[Link]) -> list[Link]:
     """Return links of which the first has the mass of all that is fixed to it, and these have none."""
     whole = _base_mass(robot)
     moments, axes = principal_of(whole.tensor)
+    inertia = without_rounding(moments)
     found = [
         replace(link, mass=0.0, inertia=ORIGIN, centre_of_mass=ORIGIN, principal=UPRIGHT) if number in held else link
         for held in [_base(robot)]
         for number, link in enumerate(links)
     ]
-    found[0] = replace(found[0], mass=whole.mass, inertia=moments, centre_of_mass=whole.centre, principal=axes)
+    found[0] = replace(found[0], mass=whole.mass, inertia=inertia, centre_of_mass=whole.centre, principal=axes)
     return found

@@ -11,9 +11,7 @@ from foosim.common.errors import BadValue
 from foosim.world.bodies.findings import Findings
 from foosim.world.bodies.inertia import (
     MASS_MIN_KG,
-    NO_MASS,
     NO_TENSOR,
-    MassOf,
     Principal,
     Tensor,
     ball_moments,
@@ -21,6 +19,7 @@ from foosim.world.bodies.inertia import (
     check_moments,
     principal_of,
     solid_of,
+    without_rounding,
 )
 from foosim.world.bodies.urdf_values import (
     EXTENT_MAX_M,
@@ -63,14 +62,14 @@ SHAPES: Final = (*PRIMITIVES, "mesh")
 class LinkPart:
     """A link as its file describes it, without the joint that it hangs on. Its shapes have no surface.
 
-    `mass` is in the link's frame; `moments` and `principal` are its principal moments and axes.
+    `inertia` has the principal moments about the centre of mass, and their axes in the link's frame.
     """
 
     name: str
     element: Element
-    mass: MassOf
-    moments: Vector
-    principal: Quaternion
+    mass: float
+    centre_of_mass: Vector
+    inertia: Principal
     shapes: tuple[Shape, ...]
     visuals: tuple[Shape, ...] = ()
 
@@ -110,16 +109,16 @@ def read_link(link: Element, colour: Colour, files: Mapping[str, bytes], finding
     name = findings.read("", name_of, link)
     found = [findings.read(None, _shape, one, colour, files, findings) for one in link.all_of("collision")]
     shapes = tuple([shape for shape in found if shape is not None])
-    mass, principal = _mass(link, name, shapes if len(shapes) == len(found) else (), findings)
-    return LinkPart(name, link, mass, principal.moments, principal.axes, shapes) if name else None
+    mass, centre, inertia = _mass(link, name, shapes if len(shapes) == len(found) else (), findings)
+    return LinkPart(name, link, mass, centre, inertia, shapes) if name else None
 
 
 # --- masses ----------------------------------------------------------------------------------------------------------
 
 
-def _mass(link: Element, name: str, shapes: Sequence[Shape], findings: Findings) -> tuple[MassOf, Principal]:
-    """Return the mass of a link in its frame, with its principal moments and axes."""
-    nothing = NO_MASS, Principal(ORIGIN, UPRIGHT)
+def _mass(link: Element, name: str, shapes: Sequence[Shape], findings: Findings) -> tuple[float, Vector, Principal]:
+    """Return the mass of a link, its centre, and its inertia."""
+    nothing = 0.0, ORIGIN, Principal(ORIGIN, UPRIGHT)
     inertial = findings.read(None, link.one_of, "inertial")
     if inertial is None:
         return nothing
@@ -138,10 +137,9 @@ def _mass(link: Element, name: str, shapes: Sequence[Shape], findings: Findings)
         moments, axes, where = _moments_instead(mass, moments, shapes)
         used = f"{', '.join(f'{moment:.3g}' for moment in moments)} kg m2, {where}"
         findings.note(inertial, f"inertia of link {name}", f"{bad.problem}; instead it has {used}")
-        return MassOf(mass, position, NO_TENSOR), Principal(moments, axes)
-    return MassOf(mass, position, NO_TENSOR), Principal(
-        moments, multiply(orientation, axes) if orientation != UPRIGHT else axes
-    )
+        return mass, position, Principal(moments, axes)
+    axes = multiply(orientation, axes) if orientation != UPRIGHT else axes
+    return mass, position, Principal(without_rounding(moments), axes)
 
 
 def _mass_value(inertial: Element) -> float:
@@ -184,7 +182,7 @@ def _moments_instead(mass: float, moments: Vector, shapes: Sequence[Shape]) -> t
             check_moments(mass, found)
         except BadValue:
             continue
-        return found, axes, where
+        return without_rounding(found), axes, where
     raise AssertionError(mass)
 
 

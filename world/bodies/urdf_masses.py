@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import Final
 
 from foosim.world.bodies.findings import Findings
-from foosim.world.bodies.inertia import NO_TENSOR, MassOf
+from foosim.world.bodies.inertia import Principal
 from foosim.world.bodies.urdf_joints import Tree
-from foosim.world.scene import MOVING, ORIGIN
+from foosim.world.scene import MOVING, UPRIGHT
 
 SHARE: Final = 0.001
 
@@ -27,7 +27,7 @@ def with_masses(tree: Tree, findings: Findings) -> Tree:
     """Of each link the one that moves it: the first link of the rigid part that it belongs to."""
     for number, (_, joint) in enumerate(tree):
         movers.append(number if joint is None or joint.kind in MOVING else movers[parents[number]])
-    masses = [link.mass.mass for link, _ in tree]
+    masses = [link.mass for link, _ in tree]
     heaviest = [*range(len(tree))]
     """Of each link the heaviest among it and the links that it carries."""
     for number in range(len(tree) - 1, 0, -1):
@@ -49,9 +49,9 @@ def with_masses(tree: Tree, findings: Findings) -> Tree:
             findings.error(link.element, f"the joint {joint.name} moves nothing: no link has a mass", link.name)
             continue
         lender = tree[source][0]
-        mean = SHARE * (lender.moments[0] + lender.moments[1] + lender.moments[2]) / 3.0
-        mass = MassOf(SHARE * masses[source], ORIGIN, NO_TENSOR)
-        lent = f"it has {mass.mass:.3g} kg and moments of {mean:.3g} kg m2, a thousandth of {lender.name}"
+        x, y, z = lender.inertia.moments
+        mass, mean = SHARE * masses[source], SHARE * (x + y + z) / 3.0
+        lent = f"it has {mass:.3g} kg and moments of {mean:.3g} kg m2, a thousandth of {lender.name}"
         findings.note(link.element, f"link {link.name} has no mass and moves", lent)
-        found[number] = replace(link, mass=mass, moments=(mean, mean, mean)), joint
+        found[number] = replace(link, mass=mass, inertia=Principal((mean, mean, mean), UPRIGHT)), joint
     return found
