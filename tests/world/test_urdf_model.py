@@ -260,7 +260,7 @@ def test_it_is_listed_and_has_its_state_by_its_settings() -> None:
 def test_inspecting_reads_meshes_from_the_asset_folder(folder: Path) -> None:
     robot = read_robot(folder / "models" / "cart.urdf", folder)
     assert robot.file == "models/cart.urdf" and robot.moving == ("axle",)
-    assert read_robot(folder / "models" / "cart.urdf", None) == robot, "its mesh is beside the folder of the file"
+    assert read_robot(folder / "models" / "cart.urdf", None) == robot, "the nearest folder that has all meshes"
     with pytest.raises(AssetError, match="not in the asset folder"):
         read_robot(folder / "models" / "cart.urdf", folder / "meshes")
     (folder / "meshes" / "shard.obj").unlink()

@@ -53,7 +53,7 @@ def read_visuals(
             findings.note(visual, UNDRAWN, bad.problem)
             continue
         for geometry, own in parts:
-            yield Shape(geometry, "", colour or own or GREY, position, orientation)
+            yield Shape(geometry, "", own or colour or GREY, position, orientation)
 
 
 def _mesh_parts(
