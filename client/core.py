@@ -43,6 +43,7 @@ from foosim.protocol.messages import (
     Up,
 )
 from foosim.protocol.rejects import Refusals
+from foosim.world.assembly.joint_selection import with_selections
 
 AGAIN_NS: Final = 200_000_000
 """Period of a repeated hello, and first back-off of a repeated Join, which doubles up to a second."""
@@ -294,7 +295,7 @@ class ClientCore:
             self._refused(f"the vHub's deployment is not valid here:\n{error}")
             return
         self.welcome = welcome
-        self.deployment = deployment
+        self.deployment = with_selections(deployment, [(one.names, one.channels) for one in welcome.joints])
         self._sequence = self.first_sequence = welcome.sequence
         self._downlink = welcome.downlink
 

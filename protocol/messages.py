@@ -330,6 +330,13 @@ class ClientHello(Message, frozen=True, tag="clienthello"):
     returns: Counter = 0
 
 
+class SelectedJoints(Item, frozen=True):
+    """The names of the joints that components of robots select, which follow from files: a client has none."""
+
+    names: Annotated[list[Annotated[str, Meta(max_length=limits.PART_NAME_LENGTH_MAX)]], Meta(max_length=256)]
+    channels: Annotated[list[tuple[Name, Name]], Meta(max_length=limits.ENTITIES_MAX)]
+
+
 class ClientWelcome(Message, frozen=True):
     """The vHub admits a client, in answer to its hello with the same `returns`: numbers continue from `sequence`, the
     next downlink is `downlink` + 1. Packets up to `sequence` are recorded; a client sends later ones again."""
@@ -343,6 +350,7 @@ class ClientWelcome(Message, frozen=True):
     deployment: Annotated[str, Meta(max_length=2 * limits.DEPLOYMENT_BYTES_MAX)]
     run: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
     returns: Counter = 0
+    joints: Annotated[list[SelectedJoints], Meta(max_length=limits.ENTITIES_MAX)] = field(default_factory=list)
 
 
 class Sent(Item, frozen=True):

@@ -32,12 +32,14 @@ from foosim.protocol.messages import (
     Go,
     Heard,
     Join,
+    SelectedJoints,
     Sent,
 )
 from foosim.runtime.roles.standstill import CLOSED, closed
 from foosim.vhub.network.memory import Joining
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.members import may_lockstep, may_restart
+from foosim.world.assembly.joint_selection import selections
 
 T = TypeVar("T")
 BOOTS_KEPT: Final = 32
@@ -248,6 +250,7 @@ class Sessions:
             build.deployment,
             build.run,
             hello.returns,
+            [SelectedJoints([*names], [*pairs]) for names, pairs in selections(deployment)],
         )
         self._actions.append(Publish(channels.CLIENT_WELCOME, hello.name, encode(welcome)))
 

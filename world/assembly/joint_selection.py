@@ -5,7 +5,7 @@ Until then a setting may have patterns, or nothing, which stands for all joints.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from foosim.common.errors import Refused
@@ -18,6 +18,7 @@ from foosim.world.scene import Body
 from foosim.world.spec import WorldSpec
 
 Spec = TypeVar("Spec", bound=WorldSpec)
+Selection = tuple[Sequence[str], Sequence[tuple[str, str]]]
 SECTIONS = ("sensors", "actuators")
 
 
@@ -45,6 +46,33 @@ def with_joint_names(spec: Spec) -> Spec:
     known: dict[tuple[int, tuple[str, ...]], Any] = {}
     named = {name: _named(robot, bodies[name], known) for name, robot in bare.items()}
     return spec.model_copy(update={"robots": {**spec.robots, **named}})
+
+
+def selections(spec: WorldSpec) -> list[Selection]:
+    """Return the names that components of robots from files select, for who has no files: names with the (robot,
+    component) pairs that select these, in this order."""
+    found: dict[tuple[str, ...], list[tuple[str, str]]] = {}
+    for name, robot in spec.robots.items():
+        for section in SECTIONS if robot.asset_paths({}) else ():
+            for label, its in sorted(getattr(robot, section).items()):
+                if its.component_type.joints and (named := its.component_type.joints_named(its)):
+                    found.setdefault(tuple(named), []).append((name, label))
+    return [*found.items()]
+
+
+def with_selections(spec: Spec, chosen: Iterable[Selection]) -> Spec:
+    """Return a world without files whose components select the joints of `selections`; unknown ones are ignored."""
+    names = {pair: [*named] for named, pairs in chosen for pair in pairs}
+    robots = dict(spec.robots)
+    for name in dict.fromkeys(robot for robot, _ in names if robot in robots):
+        sections = {section: dict(getattr(robots[name], section)) for section in SECTIONS}
+        for its in sections.values():
+            for label, settings in its.items():
+                component = settings.component_type
+                if component.joints and (name, label) in names:
+                    its[label] = settings.model_copy(update={component.joints: names[name, label]})
+        robots[name] = robots[name].model_copy(update=sections)
+    return spec.model_copy(update={"robots": robots}) if names else spec
 
 
 def _selecting(robot: RobotSettings) -> bool:
