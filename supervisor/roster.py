@@ -150,9 +150,9 @@ class Roster:
             if ready.meshes != self._meshes and not self.deployment.mixed_cpu:
                 self.by_name.pop(process.name)
                 return (
-                    f"it has read other meshes or hulls from the same files, with digest {ready.meshes.hex()[:16]}, the "
-                    f"first node's is {self._meshes.hex()[:16]}: install the same versions of numpy and pycollada on all "
-                    "machines (the deployment may say mixed_cpu: true)"
+                    f"it has read other meshes or hulls from the same files, with digest {ready.meshes.hex()[:16]}, "
+                    f"the first node's is {self._meshes.hex()[:16]}: install the same versions of numpy and pycollada "
+                    "on all machines (the deployment may say mixed_cpu: true)"
                 )
             if ready.fingerprint != self._simulation and not self.deployment.mixed_cpu:
                 self.by_name.pop(process.name)

@@ -72,6 +72,7 @@ SHELLS = {
     "node/physics/mesh_trial.py",
     "node/main.py",
     "deployment/assets.py",
+    "deployment/packages.py",
     "door/_capture.py",
     "door/_rehearse.py",
     "deployment/text/files.py",

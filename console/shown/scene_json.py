@@ -19,7 +19,19 @@ from foosim.world.components.job_reading import JobSettings
 from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
 from foosim.world.matter.mesh import Mesh
-from foosim.world.scene import Box, Capsule, Hull, Scene, Shape, Sphere, Vector, enclosing, looks_of, shape_box, swept_box
+from foosim.world.scene import (
+    Box,
+    Capsule,
+    Hull,
+    Scene,
+    Shape,
+    Sphere,
+    Vector,
+    enclosing,
+    looks_of,
+    shape_box,
+    swept_box,
+)
 from foosim.world.setting.settable import settable
 
 UNITS: Final[Mapping[str, tuple[str, ...]]] = {

@@ -132,7 +132,9 @@ def test_spoiled_meshes_are_refused_or_are_meshes(fuzz: Fuzz, disturbed: Disturb
         for _ in range(count):
             name = rng.choice(sorted(good))
             is_text = name == "d.DAE" and rng.random() < 0.5
-            content = spoiled_text(rng, COLLADA).encode(errors="replace") if is_text else disturbed.mutated(rng, good[name])
+            content = (
+                spoiled_text(rng, COLLADA).encode(errors="replace") if is_text else disturbed.mutated(rng, good[name])
+            )
             yield content
             try:
                 mesh = read_mesh(name, content, rng.choice((1.0, 1e-6, 1e6)))

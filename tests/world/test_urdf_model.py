@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import pytest
 
 from foosim.client.commands import CommandEncoder
+from foosim.common import limits
 from foosim.common.errors import DeploymentError, Malformed
 from foosim.console.shown.scene_json import scene_content
 from foosim.deployment.assets import pin_assets, read_robot
 from foosim.deployment.loader import load_deployment, with_owners
 from foosim.deployment.schema import Deployment
+from foosim.node.engines_pool import meshes_read
+from foosim.node.tick import Stepper
 from foosim.protocol.asset_transfer import Fetching
 from foosim.world.assembly.body_limits import BodyLimits
 from foosim.world.assembly.world import build_scene, initial_numbers
@@ -21,8 +25,8 @@ from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS
 from foosim.world.edits import Push, fitting_edits
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
-from foosim.world.matter.mesh import AssetError, digest_of
-from foosim.world.scene import from_rpy
+from foosim.world.matter.mesh import AssetError, Mesh, digest_of
+from foosim.world.scene import from_rpy, looks_of
 from tests.deployed import DEPLOY
 from tests.kinematic_yard import yard_text
 
@@ -77,6 +81,33 @@ def test_the_files_of_robots_and_their_meshes_are_pinned_and_travel(folder: Path
     complete = there.with_assets(fetching.contents())
     assert not complete.lacks_files and complete.asset_files == FILES, "what a capture attaches"
     assert pin_assets(text, NAME, folder) == (text, files), "pinning twice changes nothing"
+
+
+def test_the_meshes_and_hulls_that_a_node_has_read_are_told_apart(folder: Path) -> None:
+    """In the handshake: another version of a library may read other corners from the same file."""
+    found = set()
+    for content in (SHARD, SHARD.replace(b"v 0 0 1", b"v 0 0 1.0000001"), SHARD):
+        (folder / "meshes" / "shard.obj").write_bytes(content)
+        text, files = pin_assets(text_with(*ROBOTS), NAME, folder)
+        deployment = load_deployment(text, NAME).with_assets(files)
+        found.add(meshes_read(Stepper(deployment, build_layout(deployment))))
+    assert len(found) == 2 and b"" not in found
+
+
+def test_links_are_drawn_by_their_visuals_as_far_as_these_are_few(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = b'<visual><geometry><mesh filename="../meshes/shard.obj"/></geometry></visual>'
+    cart = CART.replace(b'<link name="Hull">', b'<link name="Hull">' + seen)
+    (folder / "models" / "cart.urdf").write_bytes(cart.replace(b'<link name="wheel">', b'<link name="wheel">' + seen))
+    links = read_robot(folder / "models" / "cart.urdf", folder).links
+    meshes = [link.visuals for link in links]
+    assert all(len(shape.geometry.triangles) == 2 for (shape,) in meshes if isinstance(shape.geometry, Mesh))
+    for most, count in ((4, 2), (3, 1), (1, 0)):
+        monkeypatch.setattr(limits, "LOOKS_TRIANGLES_MAX", most)
+        assert [shapes for _, shapes in looks_of(links)] == [*meshes[:count], *[link.shapes for link in links[count:]]]
+    bare = [replace(link, visuals=()) for link in links]
+    assert looks_of(bare) == [(link, link.shapes) for link in bare]
 
 
 def test_a_deployment_without_robots_of_files_names_none(folder: Path) -> None:

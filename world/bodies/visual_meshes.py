@@ -108,9 +108,9 @@ def _packed(parts: list[Part], triangles_max: int) -> bytes:
     found = _by_colour(parts)
     share = max(0.0, triangles_max - SPARED * len(found)) / whole
     packed = []
-    for colour, (vertices, triangles) in found.items():
-        if whole > triangles_max:
-            vertices, triangles = _decimated(vertices, triangles, SPARED + int(len(triangles) * share))
+    for colour, mesh in found.items():
+        is_whole = whole <= triangles_max
+        vertices, triangles = mesh if is_whole else _decimated(*mesh, SPARED + int(len(mesh[1]) * share))
         if len(triangles):
             packed.append(_DrawnPart(vertices.astype("<f4").tobytes(), triangles.astype("<u2").tobytes(), colour))
     return msgspec.msgpack.encode(_Drawn(whole, packed))
@@ -132,7 +132,7 @@ def _by_colour(parts: list[Part]) -> dict[Colour | None, tuple[NDArray[np.float6
 def _decimated(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], most: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Return a mesh with at most so many triangles: corners are joined by a library, which keeps to the surface, and
+    """Return a mesh with at most `most` triangles: corners are joined by a library, which keeps to the surface, and
     where its pieces are too small for that, those in one cell of a grid."""
     if len(triangles) <= most:
         return vertices, triangles

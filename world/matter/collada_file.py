@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 import collada
 import numpy as np
 from collada.polylist import Polylist
-from collada.scene import ControllerNode, GeometryNode, Node
+from collada.scene import ControllerNode, GeometryNode, Node, NodeNode
 from collada.triangleset import TriangleSet
 
 from foosim.common.errors import describe
@@ -38,19 +38,21 @@ if TYPE_CHECKING:
 UNIT_MIN_M: Final = 1e-6
 UNIT_MAX_M: Final = 1e6
 _TO_Z_UP: Final = {
-    "X_UP": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
-    "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-    "Z_UP": np.eye(3),
+    "X_UP": np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0]]),
+    "Y_UP": np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0]]),
+    "Z_UP": np.eye(3, 4),
 }
 """Turns by the axis that points up: right, up and towards the viewer become x, z and -y."""
 _ANY_AXIS: Final = "MeshLab"
-"""The tool whose files do not say which axis points up."""
+"""The tool that writes the same axis into every file."""
 PLACED_MAX: Final = 10_000
 """Nodes and surfaces in a scene: one that is placed twice counts twice."""
 _DECLARATION: Final = re.compile(r"\s*<\?xml.*?\?>", re.DOTALL)
 _NO_SURFACE: Final = frozenset(
-    ("library_images", "library_effects", "library_materials", "bind_material")
-    + ("library_animations", "library_cameras", "library_lights", "instance_camera", "instance_light", "extra")
+    (
+        *("library_images", "library_effects", "library_materials", "bind_material", "extra"),
+        *("library_animations", "library_cameras", "library_lights", "instance_camera", "instance_light"),
+    )
 )
 """Elements that do not concern the surface."""
 
@@ -64,24 +66,23 @@ def read_collada(name: str, content: bytes, triangles_max: int) -> list[Part]:
     text = _text(name, content)
     try:
         document = _document(text)
-        unit, turn = _unit(name, document), _turn(document)
+        whole = _turn(document) * _unit(name, document)
         parts: list[Part] = []
         left = triangles_max
-        for primitive, matrix, colour in _placed(name, document):
+        for primitive, matrix, colour in _placed(name, document, whole):
             vertices, triangles = _surface(primitive, left)
             left -= len(triangles)
             if len(triangles) == 0:
                 continue
-            if np.linalg.det(matrix[:3, :3]) < 0.0:  # mirrored: corners stay counter-clockwise, seen from outside
+            if _is_mirror(matrix):  # corners stay counter-clockwise, seen from outside
                 triangles = triangles[:, ::-1]
-            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-                placed = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ turn.T * unit
-            parts.append((placed, triangles, colour))
+            with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused
+                parts.append((_moved(vertices, matrix), triangles, colour))
     except AssetError:
         raise
     except _TooMany:
         raise too_many(name, triangles_max) from None
-    except Exception as error:  # what pycollada and numpy raise for a malformed document is of many types
+    except Exception as error:  # noqa: BLE001  # pycollada and numpy raise many types for a malformed document
         reason = f"{type(error).__name__} {' '.join(str(error).split())}"[:100]
         raise AssetError(f"{name}: {describe('no valid COLLADA file', reason)}") from None
     if not parts:
@@ -126,19 +127,41 @@ def _unit(name: str, document: Any) -> float:
 
 
 def _turn(document: Any) -> NDArray[np.float64]:
-    """Return the rotation that brings the axis that points up to z."""
+    """Return the rotation that brings the axis that points up to z, as three rows of four."""
     asset = document.assetInfo
     tools = [contributor.authoring_tool or "" for contributor in asset.contributors]
     return _TO_Z_UP["Z_UP" if any(_ANY_AXIS in tool for tool in tools) else asset.upaxis]
 
 
-def _placed(name: str, document: Any) -> Iterator[tuple[Any, NDArray[np.float64], Any]]:
-    """Yield the surfaces in the scene, in its order, each with its pose and its colour."""
+# The results of BLAS differ from machine to machine: products are written out.
+
+
+def _moved(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points (n, 3) after a transform of three rows of four."""
+    x, y, z = points[:, 0:1], points[:, 1:2], points[:, 2:3]
+    return x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2] + matrix[:, 3]
+
+
+def _within(matrix: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the transform, of three rows of four, that is `matrix` after `inner`."""
+    axes = _moved(inner[:3, :3].T, np.column_stack((matrix[:, :3], np.zeros(3))))
+    return np.column_stack((axes.T, _moved(inner[np.newaxis, :3, 3], matrix)[0]))
+
+
+def _is_mirror(matrix: NDArray[np.float64]) -> bool:
+    (a, b, c), (d, e, f), (g, h, i) = matrix[:, :3].tolist()
+    return bool(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0)
+
+
+def _placed(
+    name: str, document: Any, whole: NDArray[np.float64]
+) -> Iterator[tuple[Any, NDArray[np.float64], tuple[float, float, float, float] | None]]:
+    """Yield the surfaces in the scene, in its order, each with its pose in `whole` and its colour."""
     scenes = [document.scene] if document.scene is not None else [*document.scenes]
     if len(scenes) != 1:
         raise AssetError(f"{name}: {len(scenes)} scenes, and none is named as the one to show")
     found = 0
-    nodes = [(node, np.eye(4)) for node in reversed(scenes[0].nodes)]
+    nodes = [(node, whole) for node in reversed(scenes[0].nodes)]
     while nodes:
         node, matrix = nodes.pop()
         inner = node.geometry.primitives if isinstance(node, GeometryNode) else getattr(node, "children", [])
@@ -151,7 +174,9 @@ def _placed(name: str, document: Any) -> Iterator[tuple[Any, NDArray[np.float64]
         elif isinstance(node, ControllerNode):
             raise AssetError(f"{name}: a skin, which moves with bones; a mesh is rigid")
         elif isinstance(node, Node):
-            matrix = matrix @ np.asarray(node.matrix, np.float64)
+            transforms = (node.node if isinstance(node, NodeNode) else node).transforms
+            for transform in transforms:
+                matrix = _within(matrix, np.asarray(transform.matrix, np.float64))
             nodes += [(child, matrix) for child in reversed(inner)]
 
 
@@ -178,6 +203,6 @@ def _surface(primitive: Any, left: int) -> tuple[NDArray[np.float64], NDArray[np
         raise _TooMany
     index = primitive.vertex_index
     if index.min() < 0 or index.max() >= len(primitive.vertex):
-        raise ValueError("a triangle with a vertex that is not there")
+        raise ValueError("a triangle with an unknown vertex")
     used, renumbered = np.unique(index, return_inverse=True)
     return primitive.vertex[used].astype(np.float64), renumbered.reshape(-1, 3).astype(np.int32)
