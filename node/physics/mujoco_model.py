@@ -254,7 +254,7 @@ class ModelBuilder:
                 if index == 0:
                     made.explicitinertial, made.mass, made.inertia = True, HEAVY, (HEAVY,) * 3
             elif link.mass > 0.0:
-                made.explicitinertial, made.mass, made.inertia = True, link.mass, _possible(link.inertia)
+                made.explicitinertial, made.mass, made.inertia = True, link.mass, link.inertia
                 if made is not base:
                     made.ipos, made.iquat = link.centre_of_mass, _wxyz(link.principal)
             parents.append((made, at, turned, is_fixed))
@@ -371,12 +371,6 @@ def _holding(bodies: Sequence[Body], welds: Sequence[tuple[int, int, int]]) -> d
         for index in beside:
             found.setdefault((holder, index), set()).add(held)
     return found
-
-
-def _possible(moments: Vector) -> Vector:
-    """Return principal moments of which none is above the sum of both others: MuJoCo allows no rounding of a file."""
-    x, y, z = moments
-    return min(x, y + z), min(y, x + z), min(z, x + y)
 
 
 def _wxyz(q: Quaternion) -> tuple[float, float, float, float]:

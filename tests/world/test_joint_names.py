@@ -23,6 +23,7 @@ from foosim.deployment.loader import check_complete, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.simulation.simulation import Simulation
 from foosim.world.assembly.body_limits import BodyLimits
+from foosim.world.assembly.joint_selection import selections, with_selections
 from foosim.world.assembly.world import build_scene
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.fitted import actuators_of
@@ -50,9 +51,13 @@ MOVE: Final = {"kind": "joint_position"}
 STATE: Final = {"kind": "joint_state", "rate": "100 Hz"}
 
 
-def hand(actuators: dict[str, Any], sensors: dict[str, Any] | None = None) -> Deployment:
+def hand_text(actuators: dict[str, Any], sensors: dict[str, Any] | None = None) -> str:
     robot = {"model": "urdf", "file": "hand.urdf", "fixed": True, "actuators": actuators, "sensors": sensors or {}}
-    text = yard_text({"arm": robot}, engine="mujoco", clients={"ann": {}}, physics={"gravity": "0 m/s2"})
+    return yard_text({"arm": robot}, engine="mujoco", clients={"ann": {}}, physics={"gravity": "0 m/s2"})
+
+
+def hand(actuators: dict[str, Any], sensors: dict[str, Any] | None = None) -> Deployment:
+    text = hand_text(actuators, sensors)
     found = load_deployment(text, NAME).with_assets(FILES)
     check_complete(text, NAME, found)
     return found
@@ -119,15 +124,16 @@ def selected(deployment: Deployment) -> dict[str, list[str]]:
 
 
 def test_settings_have_names_once_the_files_are_there() -> None:
-    """In one deployment and in the one made of it; others of the robot keep what they have."""
+    """In one deployment and in the one made of it; others of the robot keep what they have. Clients have no files."""
     pose = {"kind": "pose_3d", "rate": "10 Hz", "at": {"link": "side/part 3"}}
     reach = {"kind": "joint_velocity", "joints": ["left/*"]}
-    found = hand(
-        {"grip": {"kind": "joint_position", "joints": "finger*"}, "reach": reach},
-        {"all": STATE, "one": {**STATE, "joints": "Größe [1]"}, "at": pose},
-    )
+    actuators = {"grip": {**MOVE, "joints": "finger*"}, "reach": reach}
+    sensors = {"all": STATE, "one": {**STATE, "joints": "Größe [1]"}, "at": pose}
+    found = hand(actuators, sensors)
     names = {"grip": ["finger a"], "reach": [*JOINTS[:2]], "all": [*JOINTS], "one": ["Größe [1]"], "at": []}
     assert selected(found) == names and selected(found.with_joint_names()) == names
+    without = load_deployment(hand_text(actuators, sensors), NAME)
+    assert selected(without) != names and selected(with_selections(without, selections(found))) == names
     assert selected(hand({"motors": {"kind": "joint_torque"}})) == {"motors": [*JOINTS[:4]]}
 
 

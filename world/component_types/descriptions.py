@@ -51,7 +51,7 @@ LINEAR_VELOCITY: Final = "linear_velocity"
 JOINTS: Final = ("joint_positions", "joint_velocities", "joint_efforts")
 """The fields of a jointed rigid body, a number for each joint: m or rad, m/s or rad/s, N or N m. An effort is what the
 joint's motor applied in the last substep."""
-JOINTS_MAX: Final = 64
+JOINTS_MAX: Final = 128
 """Joints that an actuator drives at most."""
 CONTACTS: Final[Mapping[str, int]] = MappingProxyType({"contacts": 3})
 """The contact log of a rigid body in the last tick: count of touches that began, impulse (N s), last substep or -1."""
