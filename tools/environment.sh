@@ -68,7 +68,7 @@ step "making the environment"
 # uncompiled, which is most of what is installed.
 step "finding out which packages are needed"
 (
-    .venv/bin/python -m pip install --progress-bar off 'setuptools>=77' 2>&1 &&
+    .venv/bin/python -m pip install --quiet 'setuptools>=77' 2>&1 &&
         .venv/bin/python -m pip install --progress-bar off --no-compile --no-build-isolation --editable '.[dev]' 2>&1 &&
         touch .venv/installed
 ) | tee .venv/setup.log | {
