@@ -41,7 +41,8 @@ fi
 python=$(python_where 'v == (3, 11)') || python=$(python_from_uv) || {
     cat >&2 <<'MESSAGE'
 
-foosim needs Python 3.11: pybullet, its physics engine, is published ready to use for Python up to 3.11 only.
+make needs Python 3.11: pybullet, the engine of football tables, is published ready to use for Python up to 3.11 only.
+(pip install . works with Python 3.11 to 3.14; after 3.11 a table needs engine: pure.)
 None was found on PATH, and uv could not fetch one (see above). Install it, then run make again:
     Debian 12:  sudo apt-get install python3.11 python3.11-venv
     Ubuntu:     sudo add-apt-repository ppa:deadsnakes/ppa && sudo apt-get install python3.11 python3.11-venv
@@ -67,7 +68,7 @@ step "making the environment"
 # uncompiled, which is most of what is installed.
 step "finding out which packages are needed"
 (
-    .venv/bin/python -m pip install --progress-bar off 'setuptools>=77' 2>&1 &&
+    .venv/bin/python -m pip install --quiet 'setuptools>=77' 2>&1 &&
         .venv/bin/python -m pip install --progress-bar off --no-compile --no-build-isolation --editable '.[dev]' 2>&1 &&
         touch .venv/installed
 ) | tee .venv/setup.log | {
