@@ -49,7 +49,7 @@ def with_joint_names(spec: Spec) -> Spec:
 
 
 def selections(spec: WorldSpec) -> list[Selection]:
-    """Return the names that components of robots from files select, for who has no files: names with the (robot,
+    """Return the names that components of robots from files select, for processes without the files: names with the (robot,
     component) pairs that select these, in this order."""
     found: dict[tuple[str, ...], list[tuple[str, str]]] = {}
     for name, robot in spec.robots.items():
