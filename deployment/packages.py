@@ -44,23 +44,12 @@ def read_mesh_file(folder: Path, assets: str, robot: str, content: bytes, mesh: 
 
 def _places(folder: Path, assets: str, robot: str, mesh: str) -> Iterator[tuple[Path, str, str]]:
     """Yield a folder, the asset folder in it, and the path in there, of each place where a mesh may be."""
-    package, _, rest = mesh.partition("/")
-    yield folder, assets, mesh
     around = robot.split("/")[:-1]
-    inner = [around[:depth] for depth in range(len(around), 0, -1)]
-    for ancestor in inner:
-        if ancestor[-1] == package:
-            yield folder, assets, "/".join((*ancestor, rest))
-        yield folder, assets, "/".join((*ancestor, mesh))
-    root = (folder / assets).resolve()
-    if root.name == package:
-        yield folder, assets, rest
-    for above in [*root.parents][:ABOVE_MAX]:
-        if above.name == package:
-            yield above, ".", rest
-        yield above, ".", mesh
-    for ancestor in (*inner, []):
-        yield folder, assets, "/".join((*ancestor, rest))
-    for above in [*root.parents][:ABOVE_MAX]:
-        if (above / "package.xml").is_file():
-            yield above, ".", rest
+    inner = ["".join(f"{name}/" for name in around[:depth]) for depth in range(len(around), 0, -1)]
+    above = [*(folder / assets).resolve().parents][:ABOVE_MAX]
+    yield folder, assets, mesh
+    yield from [(folder, assets, ancestor + mesh) for ancestor in inner]
+    yield from [(parent, ".", mesh) for parent in above]
+    inside = mesh.partition("/")[2] or mesh
+    yield from [(folder, assets, ancestor + inside) for ancestor in (*inner, "")]
+    yield from [(parent, ".", inside) for parent in above if (parent / "package.xml").is_file()]

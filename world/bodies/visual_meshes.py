@@ -133,7 +133,7 @@ def _decimated(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], most: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Return a mesh with at most `most` triangles: corners are joined by a library, which keeps to the surface, and
-    where its pieces are too small for that, those in one cell of a grid."""
+    where its pieces are too small for that, those in one cell of a grid; at last triangles are left out."""
     if len(triangles) <= most:
         return vertices, triangles
     import fast_simplification
@@ -149,5 +149,6 @@ def _decimated(
         nodes = low + np.round((vertices - low) * (cells / size)) * (size / cells)
         vertices, triangles = merged(nodes[triangles].reshape(-1, 3))
         triangles = triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]
-    used, renumbered = np.unique(triangles[:most], return_inverse=True)
+    every = -(-len(triangles) // most) or 1  # evenly, since a file has one side after the other
+    used, renumbered = np.unique(triangles[::every], return_inverse=True)
     return vertices[used], renumbered.reshape(-1, 3).astype(np.int32)
