@@ -22,9 +22,9 @@ key() {
 if [ "$(key)" != "$(cat .venv-second/key 2>/dev/null)" ]; then
     echo "Setting up .venv-second with $("$python" --version) ($python)."
     rm -rf .venv-second
-    "$python" -m venv --without-pip .venv-second
+    "$python" -m venv .venv-second
     pip() {
-        .venv/bin/python -m pip --python .venv-second/bin/python "$@"
+        .venv-second/bin/python -m pip "$@"
     }
     .venv/bin/python -m pip freeze --exclude-editable --all | grep -v '^pybullet==' >.venv-second/versions
     {
