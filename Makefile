@@ -103,7 +103,7 @@ checks: environment
 # on 3 nodes with losses, its capture simulated and judged again, commands as typed, processes.
 LAW := tests/laws/test_one_world.py::test_nodes_moves_losses_and_a_bad_bus_give_the_same_world
 SECOND := tests/common tests/client/test_core.py tests/client/test_jobs.py tests/client/test_player.py \
-	tests/runtime/test_loop.py tests/runtime/test_journal.py tests/runtime/test_process.py \
+	tests/runtime/test_loop.py tests/runtime/test_journal.py \
 	tests/deployment/test_yaml.py tests/deployment/test_engine_lacks.py tests/cli/test_yard.py \
 	tests/world/test_frame.py tests/world/test_islands.py tests/world/test_urdf_model.py \
 	tests/laws/test_island_engines.py tests/physics/test_rigid_drive.py '$(LAW)[7_0-workshop]' '$(LAW)[7_0-living]'

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from foosim.deployment.text.files import AbsentFile, read_files
+from foosim.world.scenery import path_problem
 
 ABOVE_MAX: Final = 5
 """The count of folders above the asset folder in which a package is looked for."""
@@ -29,6 +30,8 @@ def read_mesh_file(folder: Path, assets: str, robot: str, content: bytes, mesh: 
     packaged = mesh.encode() in named
     absent: AbsentFile | None = None
     for root, inside, path in _places(folder, assets, robot, mesh) if packaged else [(folder, assets, mesh)]:
+        if absent and path_problem(path):
+            continue  # nothing is read so deep
         try:
             return read_files(root, inside, [path], bytes_max=bytes_max)[path]
         except AbsentFile as error:

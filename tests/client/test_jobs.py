@@ -211,14 +211,14 @@ def test_who_was_restarted_cancels_what_it_did_not_call() -> None:
 
 
 def test_an_arm_is_given_positions_at_times() -> None:
-    """As lists or arrays; who was restarted cancels what it does not know the points of."""
+    """By joint, as lists or arrays; who was restarted cancels what it does not know the points of."""
     said: list[str] = []
 
     def first(client: Client) -> None:
         client.subscribe("scout", "jobs")
         for _ in client.lockstep(100):
             drive = client.robots["scout"].actuators["drive"]
-            drive.call(times=[0.5, 1.0], positions=[[0.5, 0.2], [0.3, 0.1]]).result()
+            drive.call(times=[0.5, 1.0], positions=[{"tilt": 0.2, "pan": 0.5}, [0.3, 0.1]]).result()
             said.append(refused(partial(drive.call, times=[1.0], positions=[0.5])))
             with pytest.raises(JobFailed, match=r"scout/drive: job \d+ has failed: its times do not rise"):
                 drive.call(times=[1.0, 0.5], positions=[[0.5, 0.2], [0.3, 0.1]]).result()
@@ -230,7 +230,7 @@ def test_an_arm_is_given_positions_at_times() -> None:
     arm["actuators"] = {"drive": arm["actuators"]["go"]}
     programs = {"hand": Program(first, cancel_what_was_left)}
     frames = run(300, programs, scout=arm, network=LOSSY, engine="mujoco", assets="models")
-    takes = "scout/drive takes times (s), positions (m or rad)"
+    takes = "scout/drive takes times (s), positions (m or rad) of pan, tilt"
     assert said[0].startswith(f"BadValue: {takes}: Expected `array`, got `float` - at `$.positions[0]`")
     assert max(frame.vector("scout", "joint_positions", 2)[0] for frame in frames) > 0.49
     assert frames[-1].at("scout", "drive.count") == 0.0

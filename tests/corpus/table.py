@@ -33,7 +33,7 @@ OWN: Final = "files"
 SETS: Final = (*PUBLIC, OWN)
 ALIKE: Final = "random_urdfs"
 """A folder of a thousand objects, of one form."""
-LIGHT_BYTES: Final = 2_000_000
+LIGHT_BYTES: Final = 4_000_000
 """Most files name meshes of at most as many bytes; the others take minutes."""
 _MESH: Final = re.compile(r"""filename\s*=\s*["'][^"']*?([^"'/]+)["']""")
 

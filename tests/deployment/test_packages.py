@@ -60,6 +60,12 @@ def test_a_mesh_of_a_package_is_found_where_packages_are(
     assert width(tmp_path / file, tmp_path / asset_root) == 1.0
 
 
+def test_places_too_deep_for_a_path_are_passed_over(tmp_path: Path) -> None:
+    file, mesh = "a/b/c/d/robots/arm.urdf", "arm/meshes/visual/parts/a.obj"
+    write(tmp_path, {f"ws/{file}": robot(f"package://{mesh}"), mesh: shard(1.0)})
+    assert width(tmp_path / "ws" / file, tmp_path / "ws") == 1.0
+
+
 def test_a_mesh_that_is_nowhere_is_an_error_with_its_places_beside_all_other_errors(tmp_path: Path) -> None:
     text = robot("package://arm/a.obj").replace("</link>", '</link><link name="a"/><joint name="j"/>')
     write(tmp_path, {"deep/robots/r.urdf": text, "deep/meshes/a.obj": shard(1.0)})

@@ -49,8 +49,8 @@ def with_joint_names(spec: Spec) -> Spec:
 
 
 def selections(spec: WorldSpec) -> list[Selection]:
-    """Return the names that components of robots from files select, for processes without the files: names with the
-    (robot, component) pairs that select these, in this order."""
+    """Return the names that components of robots from files select, for a process without the files: names in their
+    order, with the (robot, component) pairs that select these."""
     found: dict[tuple[str, ...], list[tuple[str, str]]] = {}
     for name, robot in spec.robots.items():
         for section in SECTIONS if robot.asset_paths({}) else ():
