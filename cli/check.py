@@ -111,14 +111,15 @@ def components(
 
 @app.command()
 def urdf(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A URDF file.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A URDF or MJCF file.")],
     assets: Annotated[
         Path | None,
         typer.Option(help="The asset folder; by default the nearest around FILE that has all meshes."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Show the robot in a URDF file: its tree with joints, limits, masses and shapes, and its entry of a deployment.
+    """Show the robot in a URDF or MJCF file: its tree with joints, limits, masses and shapes, and its entry of a
+    deployment.
 
     The file is read as by a run, which refuses the same: what is shown is what is simulated. What is passed over,
     mended or without effect is noted. Of a file with errors all errors are shown, then the notes.

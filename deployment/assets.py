@@ -17,7 +17,7 @@ from foosim.deployment.network.traces import file_settings
 from foosim.deployment.packages import read_mesh_file
 from foosim.deployment.text.files import AbsentFile, read_files
 from foosim.world.bodies.findings import BadRobot
-from foosim.world.bodies.urdf import SUFFIX, Robot, meshes_of, place_of_mesh, read_urdf
+from foosim.world.bodies.urdf import MJCF, SUFFIX, Robot, meshes_of, place_of_mesh, read_urdf
 from foosim.world.bodies.urdf_links import MISSING
 from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content, undrawn_path
 from foosim.world.bodies.xml_tree import read_xml
@@ -34,7 +34,7 @@ def asset_folder(file: Path) -> Path:
 
 
 def read_robot(file: Path, assets: Path | None) -> Robot:
-    """The robot in a URDF file, its meshes read from the asset folder: `asset_folder`, if none is given.
+    """The robot in a URDF or MJCF file, its meshes read from the asset folder: `asset_folder`, if none is given.
 
     Raises AssetError, for an invalid robot with all that is wrong, a line each.
     """
@@ -98,7 +98,7 @@ def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes
         for path in wanted:
             if path not in files:  # a mesh comes with its robot
                 files |= read_files(folder, deployment.assets, [path], files)
-            if path.endswith(SUFFIX):
+            if path.endswith((SUFFIX, MJCF)):
                 absent = _read_meshes(folder, deployment.assets, path, files)
                 if absent:
                     _robot(path, files, absent)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from math import inf
 from typing import Annotated
@@ -72,7 +73,7 @@ class UrdfRobot(RobotSettings):
         return {("surface", pattern): surface for pattern, surface in self.surface.items()}
 
     def asset_paths(self, files: Mapping[str, bytes]) -> Sequence[str]:
-        """Return the URDF file, and the meshes of collision shapes that it names."""
+        """Return the robot's file, and the meshes of collision shapes that it names."""
         return (self.file, *meshes_of(self.file, files[self.file])) if self.file in files else (self.file,)
 
     def check_assets(self, files: Mapping[str, bytes]) -> None:
@@ -83,11 +84,11 @@ class UrdfRobot(RobotSettings):
 def robot_of(settings: UrdfRobot, spec: WorldSpec) -> Robot:
     """Return the robot in the file that settings name. Raises BadValue where that was not given."""
     if settings.file not in spec.asset_files:
-        raise BadValue("the content of the URDF file is missing", settings.file)
+        raise BadValue("the content of the robot's file is missing", settings.file)
     return read_urdf(settings.file, spec.asset_files)
 
 
-def _slots(settings: UrdfRobot, spec: WorldSpec) -> dict[str, int]:
+def slots_of(settings: UrdfRobot, spec: WorldSpec) -> dict[str, int]:
     robot = robot_of(settings, spec)
     problem = "" if settings.fixed else free_base_problem(robot)
     if problem:
@@ -109,7 +110,7 @@ def _surfaces(settings: UrdfRobot, robot: Robot) -> list[str]:
     return [(*found, DEFAULT)[0] for found in matching]
 
 
-@model("urdf", UrdfRobot, slots=_slots, is_rigid=True)
+@model("urdf", UrdfRobot, slots=slots_of, is_rigid=True)
 class Urdf(Model):
     """A robot from a URDF file; its joints start at 0, or at the limit that is nearest to it."""
 
@@ -117,7 +118,7 @@ class Urdf(Model):
         self._settings, self._at = settings, at
         where = settings.at
         robot = robot_of(settings, at.spec)
-        self._body = body_of(
+        body = body_of(
             robot,
             at.robot.name,
             where.position,
@@ -126,6 +127,7 @@ class Urdf(Model):
             surfaces=_surfaces(settings, robot),
             speed_limit=settings.speed_limit,
         )
+        self._body = replace(body, model=at.robot.model)
 
     def body(self) -> Body:
         """Return the links and shapes of the file."""

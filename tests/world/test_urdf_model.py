@@ -203,7 +203,7 @@ def test_the_state_follows_from_the_file(deployment: Deployment) -> None:
 
 def test_without_the_file_there_is_no_state(deployment: Deployment) -> None:
     lacking = load_deployment(text_with(*ROBOTS), NAME)
-    with pytest.raises(Malformed, match=r"urdf: the content of the URDF file is missing, 'models/\w+\.urdf'"):
+    with pytest.raises(Malformed, match=r"urdf: the content of the robot's file is missing, 'models/\w+\.urdf'"):
         build_layout(lacking)
     encoder = CommandEncoder(lacking)
     assert encoder.actuators("arm") == () and encoder.actuators("post"), "clients command robots without files"

@@ -25,6 +25,7 @@ from foosim.world.bodies.xml_tree import BadElement, Element, read_xml
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Mimic, Quaternion, Shape, Vector, multiply, rotate
 
 SUFFIX: Final = ".urdf"
+MJCF: Final = ".xml"
 XACRO: Final = ".xacro"
 SHAPES_MAX: Final = 256
 """Of collision: pairs of shapes that may touch are listed, and their count grows with its square."""
@@ -42,6 +43,11 @@ NOTED: Final = {
     "contact": "surfaces are the deployment's",
     "friction": "joints have damping alone",
     "texture": "shapes have a colour",
+    "actuator": "actuators are the deployment's",
+    "geom": "scenery is the deployment's",
+    "freejoint": "the deployment frees the base (`fixed: false`)",
+    "gravcomp": "all bodies have their weight",
+    **dict.fromkeys(("armature", "frictionloss", "stiffness"), "joints have damping alone"),
 }
 """Elements that are passed over, and the reasons."""
 KNOWN: Final = {
@@ -137,6 +143,10 @@ def _read(path: str, content: bytes, meshes: tuple[tuple[str, bytes], ...]) -> R
 
 
 def _robot_of(path: str, content: bytes) -> Element:
+    if path.endswith(MJCF):
+        from foosim.world.bodies.mjcf import urdf_of  # brings MuJoCo
+
+        return urdf_of(path, content)
     robot = read_xml(path, content)
     macro = next(_macros(robot), None)
     if macro is not None or path.endswith(XACRO):

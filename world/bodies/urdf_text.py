@@ -8,7 +8,7 @@ from math import ceil, inf
 from typing import Any
 
 from foosim.common.names import is_robot_name
-from foosim.world.bodies.urdf import Robot, free_base_problem
+from foosim.world.bodies.urdf import MJCF, Robot, free_base_problem
 from foosim.world.bodies.urdf_base import base_of, height_of, wheels_of
 from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Mimic, Shape, Sphere
 
@@ -120,8 +120,9 @@ def snippet(robot: Robot) -> str:
         if joints
     ]
     actuators = f", actuators: {{{', '.join(shown)}}}" if shown else ""
+    kind = "mjcf" if robot.file.endswith(MJCF) else "urdf"
     base = f"at: {at}, fixed: {'true' if is_fixed else 'false'}"
-    return f"robots:\n  {name}: {{model: urdf, file: {robot.file}, {base}{actuators}}}\n"
+    return f"robots:\n  {name}: {{model: {kind}, file: {robot.file}, {base}{actuators}}}\n"
 
 
 def _joint_text(robot: Robot, link: Link) -> str:

@@ -6,7 +6,7 @@ Source of the format: the XML specification of URDF at wiki.ros.org/urdf/XML.
 from __future__ import annotations
 
 import re
-from math import inf
+from math import inf, sqrt
 from typing import Final, NamedTuple
 
 from foosim.world.bodies.xml_tree import Element
@@ -73,13 +73,25 @@ def vector_of(element: Element, key: str, most: float, default: Vector | None = 
 
 
 def placed_by(element: Element) -> Placed:
-    """Return the pose of the origin in an element: turned about fixed x (roll), then y (pitch), then z (yaw)."""
+    """Return the pose of the origin in an element: turned about fixed x (roll), then y (pitch), then z (yaw), or by a
+    quaternion."""
     origin = element.one_of("origin")
     if origin is None:
         return UNMOVED
     position = vector_of(origin, "xyz", EXTENT_MAX_M, ORIGIN)
+    if "quat_xyzw" in origin.attributes:
+        return Placed(position, _quaternion_of(origin))
     roll, pitch, yaw = vector_of(origin, "rpy", ANGLE_MAX_RAD, ORIGIN)
     return Placed(position, UPRIGHT if roll == pitch == yaw == 0.0 else from_rpy(roll, pitch, yaw))
+
+
+def _quaternion_of(origin: Element) -> Quaternion:
+    words = origin.attributes["quat_xyzw"].split()
+    x, y, z, w = parts = [_number(origin, "quat_xyzw", word) for word in words] if len(words) == 4 else (0.0,) * 4
+    length = sqrt(sum(part * part for part in parts))
+    if "rpy" in origin.attributes or length == 0.0:
+        raise origin.error("an origin has rpy, or a quaternion of 4 numbers, one of them not 0", " ".join(words))
+    return x / length, y / length, z / length, w / length
 
 
 def _number(element: Element, key: str, text: str) -> float:
