@@ -30,7 +30,8 @@ def asset_folder(file: Path) -> Path:
     meshes = read_xml(file.name, read_files(file.parent, ".", [file.name])[file.name]).below("mesh")
     paths = [posixpath.normpath(mesh.attributes.get("filename", "")) for mesh in meshes]
     up = max([path.split("/").count("..") for path in paths], default=0)
-    return [file.parent, *file.parent.resolve().parents][up] if up else file.parent
+    above = [file.parent, *file.parent.resolve().parents]
+    return above[min(up, len(above) - 1)]
 
 
 def read_robot(file: Path, assets: Path | None) -> Robot:

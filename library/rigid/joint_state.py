@@ -16,8 +16,9 @@ from foosim.world.components.joint_names import JointNames, joint_indices
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, SlotReadings, View
 
-JOINTS_MAX: Final = 256
-Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_MAX)]
+MEASURED_MAX: Final = 256
+"""The most joints of one reading."""
+Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=MEASURED_MAX)]
 
 
 class JointStateSettings(SensorSettings):
@@ -26,7 +27,7 @@ class JointStateSettings(SensorSettings):
     `joints` selects them by names or by patterns of these with `*`, in this order; without it they are all that move.
     """
 
-    joints: Annotated[JointNames, Field(min_length=1, max_length=JOINTS_MAX)] | None = None
+    joints: Annotated[JointNames, Field(min_length=1, max_length=MEASURED_MAX)] | None = None
 
 
 class JointState(Struct, frozen=True):

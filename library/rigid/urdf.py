@@ -73,7 +73,7 @@ class UrdfRobot(RobotSettings):
         return {("surface", pattern): surface for pattern, surface in self.surface.items()}
 
     def asset_paths(self, files: Mapping[str, bytes]) -> Sequence[str]:
-        """Return the robot's file, and the meshes of collision shapes that it names."""
+        """Return the robot's file, and the meshes that it names, those of visuals in drawn form."""
         return (self.file, *meshes_of(self.file, files[self.file])) if self.file in files else (self.file,)
 
     def check_assets(self, files: Mapping[str, bytes]) -> None:

@@ -91,18 +91,20 @@ filename="x.dae"/></geometry></collision></link>
 <joint name="b" type="revolute"><parent link="base"/><child link="f1"/><mimic joint="a"/><limit lower="0" upper="1" \
 effort="0" velocity="0"/></joint>
 <joint name="c" type="hinge"><parent link="base"/><child link="f2"/></joint>
+<link name="f3"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial></link>
+<joint name="d" type="continuous"><parent link="base"/><child link="f3"/><limit effort="0" velocity="0"/></joint>
 </robot>"""
 FOUND: Final = """g.urdf:4: a mesh that cannot be read: x.dae: No such file or directory in {folder}
-g.urdf:6: a mass of -1 kg, valid are 1e-06 to 1e+06 kg; a link without a mass has no inertial
+g.urdf:6: a mass of -1 kg, valid are 0 to 1e+06 kg; below 1e-06 kg it counts as none
 g.urdf:10: an unknown type of joint, valid are fixed, revolute, continuous, prismatic, 'hinge'
 passed over: gazebo (lines 2, 3): it is for another simulator
 passed over: plugin (lines 2, 3): sensors, actuators and rules are the deployment's
 a mass below 1 mg, of link base (line 4): it counts as none
 inertia of link f2 (line 7): principal moments of 0.1, 0.1 and 1 kg m2: no body has one above the sum of both others, \
 0.2; instead it has 0.4, 0.4, 0.4 kg m2, its sum spread evenly
-an effort of 0, of joint b (line 9): its motor applies no force
-a velocity of 0, of joint b (line 9): its motor cannot move it
 joint b follows a (line 9): that does not move it, it is at 0
+an effort of 0, of joint d (line 12): its motor applies no force
+a velocity of 0, of joint d (line 12): its motor cannot move it
 """
 
 

@@ -41,7 +41,7 @@ FIRST_MASS: Final = ARM[ARM.index("<mass") :].partition("/>")[0] + "/>"
 
 FILES: Final[dict[str, tuple[str, str, str]]] = {
     "a loop": ("</robot>", LOOP, "a loop: "),
-    "a mass of a mountain": (FIRST_MASS, '<mass value="1e8"/>', "a mass of 1e+08 kg, valid are 1e-06 to 1e+06 kg"),
+    "a mass of a mountain": (FIRST_MASS, '<mass value="1e8"/>', "a mass of 1e+08 kg, valid are 0 to 1e+06 kg"),
 }
 
 

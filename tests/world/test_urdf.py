@@ -453,7 +453,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     ),
     "far": (robot_text(joint=LIMIT + '<origin xyz="0 0 1e4"/>'), "3: xyz of origin is not within -1000 to 1000"),
     "damping": (robot_text(joint=LIMIT + '<dynamics damping="-1"/>'), "3: damping of dynamics is not within 0"),
-    "negative mass": (inertial("-1", **UNIT), "3: a mass of -1 kg, valid are 1e-06 to"),
+    "negative mass": (inertial("-1", **UNIT), "3: a mass of -1 kg, valid are 0 to"),
     "absurd mass": (inertial("1e8", **UNIT), r"3: a mass of 1e\+08 kg, valid are"),
     "no moment": (inertial(ixx="1", iyy="1"), "4: inertia without izz"),
     "no shape": (collision(""), r"4: a geometry with 0 shapes: it has one|3: a geometry with 0"),

@@ -199,8 +199,8 @@ def combined(parts: Iterable[MassOf]) -> MassOf:
 def check_mass(mass: float) -> float:
     """Return a valid mass of a robot's body. Raises BadValue."""
     if not MASS_MIN_KG <= mass <= MASS_MAX_KG:
-        valid = f"valid are {MASS_MIN_KG:g} to {MASS_MAX_KG:g} kg"
-        raise BadValue(f"a mass of {mass:g} kg, {valid}; a link without a mass has no inertial")
+        valid = f"valid are 0 to {MASS_MAX_KG:g} kg; below {MASS_MIN_KG:g} kg it counts as none"
+        raise BadValue(f"a mass of {mass:g} kg, {valid}")
     return mass
 
 

@@ -20,6 +20,7 @@ from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of, 
 from foosim.world.bodies.urdf_joints import Following, JointPart, Tree, followers_of, in_tree, read_joint
 from foosim.world.bodies.urdf_links import LinkPart, mesh_path, meshes_in, read_link
 from foosim.world.bodies.urdf_masses import with_masses
+from foosim.world.bodies.urdf_values import name_of
 from foosim.world.bodies.urdf_visuals import first_colour, materials_of, read_visuals
 from foosim.world.bodies.xml_tree import BadElement, Element, read_xml
 from foosim.world.scene import MOVING, ORIGIN, UPRIGHT, Body, Link, Mimic, Quaternion, Shape, Vector, multiply, rotate
@@ -129,6 +130,7 @@ def read_urdf(path: str, files: Mapping[str, bytes]) -> Robot:
 @lru_cache(maxsize=KEPT)
 def _read(path: str, content: bytes, meshes: tuple[tuple[str, bytes], ...]) -> Robot:
     robot, findings = _robot_of(path, content), Findings()
+    name = findings.read("", name_of, robot) if robot.attributes.get("name", "").strip() else ""
     _note_passed_over(robot, findings)
     for element in robot.all_of(*REFUSED):
         findings.error(element, "not a part of URDF that makes a tree of links", element.tag)
@@ -139,7 +141,7 @@ def _read(path: str, content: bytes, meshes: tuple[tuple[str, bytes], ...]) -> R
     index = {link.name: number for number, (link, _) in enumerate(tree)}
     at = {joint.name: number for number, (_, joint) in enumerate(tree) if joint is not None}
     made = tuple([_link(link, joint, index, at, following) for link, joint in tree])
-    return Robot(robot.attributes.get("name", ""), path, made, notes)
+    return Robot(name, path, made, notes)
 
 
 def _robot_of(path: str, content: bytes) -> Element:

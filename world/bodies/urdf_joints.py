@@ -108,8 +108,8 @@ def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> Join
 
 
 def _note_motor(joint: JointPart, findings: Findings) -> None:
-    """Note a motor that does nothing, and one without bounds where the joint has a limit."""
-    for limit in joint.element.all_of("limit"):
+    """Note a motor that does nothing, and one without bounds where the joint has a limit, but not of mimic joints."""
+    for limit in joint.element.all_of("limit") if joint.follows is None else ():
         if joint.effort == 0.0:
             findings.note(limit, "an effort of 0, of joint", "its motor applies no force", joint.name)
         if joint.speed == 0.0:

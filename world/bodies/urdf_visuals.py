@@ -7,7 +7,7 @@ from hashlib import blake2b
 from typing import Final
 
 from foosim.world.bodies.findings import Findings
-from foosim.world.bodies.urdf_links import mesh_path, primitive, scale_of, shape_in
+from foosim.world.bodies.urdf_links import MISSING, mesh_path, primitive, scale_of, shape_in
 from foosim.world.bodies.urdf_values import placed_by, text_of
 from foosim.world.bodies.xml_tree import BadElement, Element
 from foosim.world.matter.mesh import Mesh
@@ -67,7 +67,7 @@ def _mesh_parts(
     path = mesh_path(mesh)
     drawn = drawn_path(path)
     if drawn not in files:
-        raise mesh.error("the file of a mesh is missing", path)
+        raise mesh.error(MISSING, path)
     scale = scale_of(mesh)
     parts, remark = drawn_parts(files[drawn])
     if remark and parts:
