@@ -71,6 +71,7 @@ from foosim.world.layout import (
 )
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.moving.upright import stands_upright
+from foosim.world.placing import MountedAt
 from foosim.world.scenery import SceneryMesh
 
 SECTIONS: Final = ("sensors", "actuators", "rules")
@@ -812,12 +813,12 @@ def _start(deployment: Deployment, ends: Names) -> Iterator[Finding]:
 
 
 def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield components whose settings do not fit their robots or the world: an unknown joint, for one."""
+    """Yield components whose settings do not fit their robots or the world: an unknown joint or link, for one."""
     checked = [
         (name, section, channel, settings)
         for name, robot in spec.robots.items()
         for section, channel, settings in _components_of(robot)
-        if overrides(settings.component_type.factory, "check") or _selects(settings)
+        if overrides(settings.component_type.factory, "check") or _selects(settings) or _mounting(settings)
     ]
     layout = build_layout(spec) if checked else None
     for name, section, channel, settings in checked:
@@ -828,6 +829,8 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
         try:
             if _selects(settings):
                 _check_joints(component_type, settings, at)
+            if where := _mounting(settings):
+                _check_mount(where, at)
             if overrides(component_type.factory, "check"):
                 component_type.factory.check(settings, at)
         except IncompatibleComponent as error:
@@ -838,6 +841,19 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
 def _selects(settings: ComponentSettings) -> bool:
     """Whether a component has a setting that selects joints of its robot."""
     return bool(getattr(settings.component_type, "joints", ""))
+
+
+def _mounting(settings: ComponentSettings) -> MountedAt | None:
+    """Return where a component is mounted; None of one without a place on its robot."""
+    where = getattr(settings, "at", None)
+    return where if isinstance(where, MountedAt) else None
+
+
+def _check_mount(where: MountedAt, at: Mounting) -> None:
+    """Raise IncompatibleComponent for a robot without a body, or a link that it does not have."""
+    from foosim.world.components.mounted import body_at, link_index  # brings numpy
+
+    link_index(body_at(at), where.link)
 
 
 def _check_joints(component: Component, settings: ComponentSettings, at: Mounting) -> None:

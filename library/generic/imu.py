@@ -64,7 +64,7 @@ class Imu(MountedSensor):
 
     @staticmethod
     def check(settings: ImuSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for an unknown link, or a robot whose motion at that place is unknown."""
+        """Raise IncompatibleComponent for a robot whose motion at that place is unknown."""
         Mounted(at, settings.at).check_twist()
 
     def sample(self, view: WritableView) -> Inertial:

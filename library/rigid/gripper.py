@@ -81,8 +81,7 @@ class Gripper(Actuator):
 
     @staticmethod
     def check(settings: GripperSettings, at: Mounting) -> None:
-        """Raise IncompatibleComponent for an unknown link, an engine without grasps, a robot that it does not
-        solve."""
+        """Raise IncompatibleComponent for an engine without grasps, and a robot that it does not solve."""
         having = [name for name in registry.engines() if ENGINES[name].grasps]
         if not at.spec.engine_type.grasps:
             what = f"the engine {at.spec.engine} has no grasps: valid is {' or '.join(having)}"
@@ -90,7 +89,6 @@ class Gripper(Actuator):
         if not (at.robot.is_rigid and at.robot.kind.couples):
             what = f"{at.robot.name} is no rigid body, so that no load would move it: {VALID}"
             raise IncompatibleComponent(("kind",), what, settings.kind)
-        link_index(body_at(at), settings.at.link)
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and the greatest command."""

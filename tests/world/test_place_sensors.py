@@ -168,6 +168,8 @@ def test_a_touch_sends_between_the_times_of_the_rate() -> None:
          "at.link: red.goal has no such link; there are slide, spin, 'spn', nearest is 'spin'"),
         ("{kind: imu, rate: 10 Hz, at: {link: wheel}}",
          "at.link: red.goal has no such link; there are slide, spin, 'wheel'"),
+        ("{kind: laser_scanner, rate: 10 Hz, range: 1 m, rays: 5, at: {link: slid}}",
+         "at.link: red.goal has no such link; there are slide, spin, 'slid', nearest is 'slide'"),
         ("{kind: joint_state, rate: 10 Hz, joints: [spin, slid]}",
          "joints[1]: red.goal has no such joint; there are slide, spin, 'slid', nearest is 'slide'"),
         ("{kind: joint_state, rate: 10 Hz, joints: [spin, spin]}", "joints[1]: named twice, 'spin'"),

@@ -68,11 +68,6 @@ class MountedSensor(Sensor):
     def __init__(self, settings: Any, at: Mounting) -> None:
         self.mount = Mounted(at, settings.at)
 
-    @staticmethod
-    def check(settings: Any, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a link that the robot does not have."""
-        Mounted(at, settings.at)
-
 
 class MountedTogether(Rows):
     """Several places on robots. Those on free links are found at once, with the bits of each by itself."""
