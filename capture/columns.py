@@ -134,9 +134,9 @@ class Frames:
         """Return one of them as a frame, from which a world can be continued; raises IndexError."""
         return Frame(int(self.ticks[index]), self.layout, np.array(self.values[index]), self.outboxes[index])
 
-    def column(self, entity: str, field: str, count: int = 1, *, joint: str = "") -> Numbers:
-        """Return one field of an entity over time: (n,), or (n, count) for the first numbers of a field of several, or
-        (n,) for the number of a joint by its name, as of `joint_positions`.
+    def column(self, entity: str, field: str, count: int | None = None, *, joint: str = "") -> Numbers:
+        """Return one field of an entity over time: (n,) for one number, (n, count) for several: all numbers of the field
+        or its first ones. Of a field with a number for each joint, as `joint_positions`, `joint` selects one, (n,).
 
         Of a free body `position`, `orientation` and `linear_velocity` are of the origin of its first link, as on
         /tf and in its sensors' readings; `CENTRE_OF_SLOT` is of the link's centre of mass. The numbers are NaN
@@ -151,6 +151,8 @@ class Frames:
             found = np.where(is_absent[:, np.newaxis], np.nan, found)
         if joint:
             return found[:, self._joint(entity, field, joint)]
+        if count is None:
+            count = found.shape[1]
         if not 1 <= count <= found.shape[1]:
             raise CaptureError(f"{entity}: {field} has 1 to {found.shape[1]} numbers, not {count}")
         return found[:, 0] if count == 1 else found[:, :count]

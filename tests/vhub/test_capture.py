@@ -61,7 +61,7 @@ def test_frames_come_back_at_their_ticks_with_the_first_and_the_last(capture: Ca
         kept = hub_run.closings[tick].frame
         assert frames.frame(index).digest == kept.digest
         assert frames.frame(index).outboxes == kept.outboxes
-        joint = frames.column("red.goal", "joint_positions", 2)
+        joint = frames.column("red.goal", "joint_positions")
         assert joint[index].tolist() == kept.vector("red.goal", "joint_positions", 2)
         assert frames.column("red.attack", "down")[index] == kept.at("red.attack", "down")
 
@@ -75,7 +75,7 @@ def test_a_column_has_gaps_where_the_entity_was_absent(capture: CaptureData, hub
     added = frames.column("ball-2", "position", 3)
     assert np.isnan(added).all(axis=1).tolist() == [True] * 3 + [False] * 2 + [True] * 3
     assert added[3:5].tolist() == [frame.vector("ball-2", "position", 3) for frame in kept[3:5]]
-    assert np.isnan(frames.column("ball-2", "contacts")).tolist() == [True] * 3 + [False] * 2 + [True] * 3
+    assert np.isnan(frames.column("ball-2", "contacts", 1)).tolist() == [True] * 3 + [False] * 2 + [True] * 3
     for index in (0, 3, 7, -1, -8):
         assert frames.frame(index).digest == kept[index].digest
     for index in (8, -9):
