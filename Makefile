@@ -84,9 +84,10 @@ corpus: robots
 
 # Public robots, 131 MB, once. Where they cannot be had, tests that read them are skipped; with CI set they fail.
 robots: environment
-	@$(PYTHON) -c 'from importlib.metadata import version; version("example-robot-data")' 2>/dev/null || \
-	PYTHONPATH= $(PYTHON) -m pip install --quiet --disable-pip-version-check \
-	"$$(sed -n 's/^corpus = \["\(.*\)"\]/\1/p' pyproject.toml)" || echo 'The tests run without public robots.'
+	@pin=$$(sed -n 's/^corpus = \["\(.*\)"\]/\1/p' pyproject.toml) && \
+	$(PYTHON) -c 'import sys; from importlib.metadata import version as v; sys.exit(sys.argv[1] != "example-robot-data==" + v("example-robot-data"))' \
+	"$$pin" 2>/dev/null || PYTHONPATH= $(PYTHON) -m pip install --quiet --disable-pip-version-check "$$pin" || \
+	echo 'The tests run without public robots.'
 
 swarm-gate: environment
 	@$(PYTHON) -m tests.gate.search $(ARGS)

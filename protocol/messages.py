@@ -14,6 +14,7 @@ from msgspec import Meta, field
 
 from foosim.common import limits
 from foosim.common.struct_types import Counter, Digest, Item, Message, Name, Names, Numbers, Payload, Text
+from foosim.world.component_types.descriptions import JOINTS_READ_MAX
 from foosim.world.edits import Edits
 from foosim.world.robot_packets import Delivered, Outboxes, RobotPacket
 from foosim.world.start import Origin
@@ -333,7 +334,9 @@ class ClientHello(Message, frozen=True, tag="clienthello"):
 class SelectedJoints(Item, frozen=True):
     """The names of the joints that components of robots select, which follow from files: a client has none."""
 
-    names: Annotated[list[Annotated[str, Meta(max_length=limits.PART_NAME_LENGTH_MAX)]], Meta(max_length=256)]
+    names: Annotated[
+        list[Annotated[str, Meta(max_length=limits.PART_NAME_LENGTH_MAX)]], Meta(max_length=JOINTS_READ_MAX)
+    ]
     channels: Annotated[list[tuple[Name, Name]], Meta(max_length=limits.ENTITIES_MAX)]
 
 

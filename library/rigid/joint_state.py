@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, ClassVar
 
 from msgspec import Meta, Struct
 from pydantic import Field
 
-from foosim.world.component_types.descriptions import JOINTS
+from foosim.world.component_types.descriptions import JOINTS, JOINTS_READ_MAX
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
@@ -16,9 +16,7 @@ from foosim.world.components.joint_names import JointNames, joint_indices
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, SlotReadings, View
 
-MEASURED_MAX: Final = 256
-"""The most joints of one reading."""
-Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=MEASURED_MAX)]
+Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_READ_MAX)]
 
 
 class JointStateSettings(SensorSettings):
@@ -27,7 +25,7 @@ class JointStateSettings(SensorSettings):
     `joints` selects them by names or by patterns of these with `*`, in this order; without it they are all that move.
     """
 
-    joints: Annotated[JointNames, Field(min_length=1, max_length=MEASURED_MAX)] | None = None
+    joints: Annotated[JointNames, Field(min_length=1, max_length=JOINTS_READ_MAX)] | None = None
 
 
 class JointState(Struct, frozen=True):

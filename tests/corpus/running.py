@@ -20,7 +20,7 @@ from foosim.world.clearance.convex import convex_parts
 from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.scene import ORIGIN, Body, place
-from tests.corpus.table import folder_of
+from tests.corpus.table import folder_of, foreign_version
 
 NAME: Final = "corpus.yaml"
 TICK_S: Final = 0.01
@@ -28,11 +28,12 @@ SUBSTEPS: Final = 4
 
 
 def needed(which: str) -> Path:
-    """Return the folder of a set of robots. Without it a test is skipped; with CI in the environment it fails, but
-    that no pybullet is published for later Pythons than 3.11."""
+    """Return the folder of a set of robots. Without it, and with another version than the table has, a test is skipped;
+    with CI in the environment it fails, but that no pybullet is published for later Pythons than 3.11."""
     folder = folder_of(which)
-    if folder is None:
-        reason = f"{which} is not installed: `make robots` installs it, on Python 3.11"
+    other = foreign_version(which)
+    if folder is None or other:
+        reason = f"{other or f'{which} is not installed'}: `make robots` installs it, on Python 3.11"
         if os.environ.get("CI") and sys.version_info < (3, 12):
             pytest.fail(reason)
         pytest.skip(reason)

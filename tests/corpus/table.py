@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
+import tomllib
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -48,6 +49,16 @@ def folder_of(which: str) -> Path | None:
     except PackageNotFoundError:
         return None
     return folder if folder.is_dir() else None
+
+
+def foreign_version(which: str) -> str:
+    """Return in words that another version of a set is installed than `pyproject.toml` has, empty without one."""
+    text = (HERE.parents[1] / "pyproject.toml").read_text(encoding="utf-8")
+    for pin in tomllib.loads(text)["project"]["optional-dependencies"]["corpus"]:
+        package, _, wanted = pin.partition("==")
+        if package == which and folder_of(which) and (found := distribution(package).version) != wanted:
+            return f"{package} {found} is installed, tests/corpus/table.txt has {wanted}"
+    return ""
 
 
 def files_of(which: str, folder: Path, *, is_light: bool) -> dict[str, Path]:

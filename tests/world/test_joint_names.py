@@ -123,6 +123,15 @@ def selected(deployment: Deployment) -> dict[str, list[str]]:
     return {name: getattr(one, "joints", []) for name, one in parts.items()}
 
 
+@pytest.mark.parametrize(("has_motors", "most"), [(True, 128), (False, 256)])
+def test_more_joints_than_a_component_has_numbers_for_are_refused(has_motors: bool, most: int) -> None:
+    """Of a robot with more the component names those that it needs."""
+    names = [f"j{number}" for number in range(most + 1)]
+    assert len(joint_indices(body(*names[:most]), None, has_motors=has_motors)) == most
+    with pytest.raises(IncompatibleComponent, match=f"more than {most} joints of r"):
+        joint_indices(body(*names), None, has_motors=has_motors)
+
+
 def test_settings_have_names_once_the_files_are_there() -> None:
     """In one deployment and in the one made of it; others of the robot keep what they have. Clients have no files."""
     pose = {"kind": "pose_3d", "rate": "10 Hz", "at": {"link": "side/part 3"}}

@@ -12,7 +12,7 @@ import pytest
 
 from foosim.deployment.assets import pin_assets, read_robot
 from foosim.deployment.loader import load_deployment, with_owners
-from foosim.node.physics.mujoco_model import ModelBuilder
+from foosim.node.physics.mujoco_model import ModelBuilder, warnings
 from foosim.simulation.simulation import Simulation
 from foosim.world.bodies.urdf import body_of, read_urdf
 from foosim.world.bodies.visual_meshes import drawn_content, drawn_path
@@ -219,6 +219,14 @@ BAD: Final = {
         [":29: an unknown shape, there are box, sphere, cylinder, capsule, mesh, 'ellipsoid'", ":30: "],
     ),
     "parts": (ARM.replace(b"<option", b'<include file="/etc/hosts"/><option'), [":3: a part of another file"]),
+    "parts in capitals": (
+        ARM.replace(b"<option", b'<Include file="/etc/hosts"/><option'),
+        [":3: a part of another file"],
+    ),
+    "copies": (
+        ARM.replace(b"<worldbody>", b'<worldbody><replicate count="1000000000"/>', 1),
+        ["a count of copies, without a bound: read the file", "'replicate'"],
+    ),
     "MuJoCo": (ARM.replace(b'childclass="reacher"', b'childclass="x"'), [":20: MuJoCo refuses it: ", "default"]),
 }
 
@@ -230,3 +238,14 @@ def test_what_would_be_another_robot_is_refused(name: str) -> None:
         read_urdf("m/arm.xml", {**FILES, "m/arm.xml": content})
     for error in errors:
         assert (f"m/arm.xml{error}" if error.startswith(":") else error) in str(refused.value)
+
+
+def test_sizes_of_memory_in_a_file_are_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what MuJoCo warns of is written to no file, and fails no engine."""
+    monkeypatch.chdir(tmp_path)
+    greedy = b"""<size memory="1000G" nuserdata="2000000000" nkey="2000000000" nuser_body="1000000000"/>
+    <sensor><user dim="1000000000"/></sensor><keyframe><key qpos="nan"/></keyframe>"""
+    content = ARM.replace(b"<worldbody>", greedy.replace(b"\n", b"") + b"<worldbody>", 1)
+    found = read_urdf("m/arm.xml", {**FILES, "m/arm.xml": content})
+    assert found.links == read_urdf("m/arm.xml", {**FILES, "m/arm.xml": ARM}).links
+    assert not warnings and not [*tmp_path.iterdir()]

@@ -175,6 +175,9 @@ BOX: Final = '<collision><origin xyz="{x} 0 0"/><geometry><box size="1 2 3"/></g
         {"ixx": "0", "iyy": "0", "izz": "0"},
         {"ixx": "1", "iyy": "1", "izz": "9"},
         {"ixx": "-1", "iyy": "1", "izz": "1"},
+        {"ixx": "1", "ixy": "2", "iyy": "1", "izz": "1"},
+        {"ixx": "9e8", "iyy": "9e8", "izz": "9e8"},
+        {"ixx": "1e-12", "iyy": "1e-12", "izz": "1e-12"},
     ],
 )
 def test_an_inertia_that_no_body_has_is_that_of_the_shapes_at_the_files_mass(moments: dict[str, str]) -> None:

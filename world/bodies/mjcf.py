@@ -31,10 +31,17 @@ REFUSED: Final = {
     "include": f"a part of another file: {_SAVED}",
     "model": f"a part of another file: {_SAVED}",
     "extension": "plugins of MuJoCo are not loaded",
+    "replicate": f"a count of copies, without a bound: {_SAVED}",
     **dict.fromkeys(("flexcomp", "composite"), "a soft body: the links of a robot are rigid"),
     **dict.fromkeys(("connect", "weld"), "a loop: the bodies of a robot are a tree"),
 }
-"""Elements without which it would be another robot, or for which MuJoCo would open a file."""
+"""Elements without which it would be another robot, or for which MuJoCo would open a file or take any amount of memory.
+Their names count in any case: MuJoCo takes `INCLUDE` for `include`, too."""
+SIZES: Final = (
+    *("memory", "nstack", "nconmax", "njmax", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_site", "nuser_cam"),
+    *("nuser_tendon", "nuser_actuator", "nuser_sensor"),
+)
+"""Sizes of memory that a file may set, and its robot does not need."""
 SHOWN_GROUPS: Final = 3
 """A viewer shows shapes of the groups below this one."""
 UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)
@@ -49,18 +56,22 @@ def urdf_of(path: str, content: bytes) -> Element:
     root = read_xml(path, content)
     if root.tag != "mujoco":
         raise root.error("no MJCF: the outermost element is mujoco", root.tag)
-    errors = [found.error(REFUSED[found.tag], found.tag) for found in root.below(*REFUSED)]
+    errors = [found.error(REFUSED[tag], found.tag) for found in root.below() if (tag := found.tag.lower()) in REFUSED]
     if errors:
         raise BadRobot([*map(str, errors)], ())
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)  # by default it writes MUJOCO_LOG.TXT; engines fail by their warnings
     try:
         spec = mujoco.MjSpec.from_string(content.decode("utf-8", "replace"))
         made = _Made(path, spec)
         m = spec.compile()
-    except ValueError as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
         what = " ".join(str(error).split())
         line = _LINE.search(what)
         place = f"{path}:{line[1]}" if line else path
         raise AssetError(f"{place}: MuJoCo refuses it: {_LINE.sub('', what)}") from None
+    finally:
+        mujoco.set_mju_user_warning(before)
     return Element(path, root.line, "robot", {"name": spec.modelname}, [*made.elements(m), *_passed_over(root)])
 
 
@@ -109,8 +120,13 @@ class _Made:
             raise BadRobot([*map(str, errors)], ())
         for material in spec.materials:
             material.textures = [""] * len(material.textures)
-        for part in (*spec.meshes, *spec.textures, *spec.hfields, *spec.skins):
+        for part in (*spec.meshes, *spec.textures, *spec.hfields, *spec.skins, *spec.sensors, *spec.keys):
             spec.delete(part)
+        for size in SIZES:
+            setattr(spec, size, -1)
+        spec.nuserdata = spec.nkey = 0
+        for actuator in spec.actuators:
+            actuator.nsample, actuator.delay = 0, 0.0
 
     def _weighs(self, geom: Any) -> bool:
         """Whether a shape has a share in the mass of its body."""

@@ -72,9 +72,9 @@ class Element:
         return found[0] if found else None
 
     def below(self, *tags: str) -> Iterator[Element]:
-        """Yield the elements of these names at any depth in it, in their order."""
+        """Yield the elements of these names, without one all, at any depth in it, in their order."""
         for child in self.children:
-            if child.tag in tags:
+            if not tags or child.tag in tags:
                 yield child
             yield from child.below(*tags)
 

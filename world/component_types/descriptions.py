@@ -53,6 +53,8 @@ JOINTS: Final = ("joint_positions", "joint_velocities", "joint_efforts")
 joint's motor applied in the last substep."""
 JOINTS_MAX: Final = 128
 """Joints that an actuator drives at most."""
+JOINTS_READ_MAX: Final = 256
+"""Joints that a sensor measures at most."""
 CONTACTS: Final[Mapping[str, int]] = MappingProxyType({"contacts": 3})
 """The contact log of a rigid body in the last tick: count of touches that began, impulse (N s), last substep or -1."""
 

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator
 
 from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import PartName
-from foosim.world.component_types.descriptions import JOINTS_MAX
+from foosim.world.component_types.descriptions import JOINTS_MAX, JOINTS_READ_MAX
 from foosim.world.components.view import IncompatibleComponent
 from foosim.world.scene import Body
 
@@ -53,8 +53,9 @@ def joint_indices(
         if not driven:
             raise IncompatibleComponent((setting, place), _following(body, selected[0]), text)
         found |= dict.fromkeys(driven)
-    if has_motors and len(found) > JOINTS_MAX:
-        raise IncompatibleComponent((setting,), f"more than {JOINTS_MAX} joints of {body.name}", len(found))
+    most = JOINTS_MAX if has_motors else JOINTS_READ_MAX
+    if len(found) > most:
+        raise IncompatibleComponent((setting,), f"more than {most} joints of {body.name}", len(found))
     return tuple(found)
 
 
