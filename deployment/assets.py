@@ -16,7 +16,7 @@ from foosim.deployment.loader import apply_sets, check_complete, load_deployment
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.packages import read_mesh_file
 from foosim.deployment.text.files import AbsentFile, read_files
-from foosim.world.bodies.findings import BadRobot
+from foosim.world.bodies.findings import BadRobot, listed
 from foosim.world.bodies.urdf import MJCF, SUFFIX, Robot, meshes_of, place_of_mesh, read_urdf
 from foosim.world.bodies.urdf_links import MISSING
 from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content, undrawn_path
@@ -50,7 +50,8 @@ def read_robot(file: Path, assets: Path | None) -> Robot:
 
 def _read_meshes(folder: Path, assets: str, robot: str, files: dict[str, bytes]) -> list[str]:
     """Add the meshes that a robot's file names to `files`, and return why some of collisions are not there."""
-    absent = []
+    absent: dict[str, list[tuple[str, str]]] = {}
+    """Meshes and the places of them, by where they were searched."""
     for mesh in meshes_of(robot, files[robot]):
         if mesh in files:
             continue
@@ -62,15 +63,24 @@ def _read_meshes(folder: Path, assets: str, robot: str, files: dict[str, bytes])
             if raw:
                 files[mesh] = undrawn_content(str(error))
                 continue
-            unread = f"{place_of_mesh(robot, files[robot], mesh)}: a mesh that cannot be read: {error}"
+            place = place_of_mesh(robot, files[robot], mesh)
             if not isinstance(error, AbsentFile):
-                raise AssetError(unread) from None
-            absent.append(unread)
+                raise AssetError(f"{place}: a mesh that cannot be read: {error}") from None
+            absent.setdefault(error.what.removeprefix(f"{mesh}: "), []).append((mesh, place))
             continue
         files[mesh] = drawn_content(raw, content) if raw else content
         if sum(map(len, files.values())) > limits.ASSETS_BYTES_MAX:
             raise AssetError(f"{mesh}: the files up to this one have more than {limits.ASSETS_BYTES_MAX} bytes")
-    return absent
+    return [_unread(meshes, why) for why, meshes in absent.items()]
+
+
+def _unread(meshes: list[tuple[str, str]], why: str) -> str:
+    """Return the error of meshes, with their places, that were searched in the same folders."""
+    (mesh, place), *others = meshes
+    if not others:
+        return f"{place}: a mesh that cannot be read: {mesh}: {why}"
+    names, lines = [name for name, _ in meshes], [one.rpartition(":")[2] for _, one in meshes]
+    return f"{place}: {len(meshes)} meshes that cannot be read: {listed(names)} (lines {listed(lines)}): {why}"
 
 
 def _robot(path: str, files: Mapping[str, bytes], absent: list[str]) -> Robot:

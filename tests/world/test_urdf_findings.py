@@ -196,7 +196,7 @@ def test_without_shapes_it_is_even_over_the_axes(moments: dict[str, str], used: 
     assert robot.links[1].inertia == pytest.approx((used,) * 3)
     (note,) = robot.notes
     shown = " and ".join((", ".join([moments["ixx"], moments["iyy"]]), moments["izz"]))
-    assert note.startswith(f"inertia of link b (line 3): principal moments of {shown} kg m2: ")
+    assert note.startswith(f"inertia of link b (line 3): principal moments of {shown} kg m2")
     assert f"; instead it has {used:.3g}, {used:.3g}, {used:.3g} kg m2, " in note, "both values"
 
 
@@ -354,7 +354,6 @@ def test_looks_have_shapes_and_colours_of_their_own() -> None:
         (visual('<sphere radius="-1"/>'), "radius of sphere is not within 0.0001 to 1000, '-1'"),
         (visual("<cone/>"), "an unknown shape, there are box, sphere, cylinder, capsule, mesh, 'cone'"),
         (visual('<mesh filename="b.obj"/>'), "the file of a mesh is missing, 'b.obj'"),
-        (visual('<mesh filename="a.obj"/>'), "a.obj: too round"),
         (
             visual('<mesh filename="file:///a.obj"/>'),
             "a mesh is a path relative to this file, or package://PACKAGE/PATH, 'file:///a.obj'",
@@ -364,6 +363,12 @@ def test_looks_have_shapes_and_colours_of_their_own() -> None:
 def test_a_visual_that_cannot_be_drawn_is_no_error(looks: str, why: str) -> None:
     robot = read(link("a", MASS + BALL + looks), drawn=undrawn_content("a.obj: too round"))
     assert robot.notes == (f"a visual is not drawn (line 2): {why}",) and robot.links[0].visuals == ()
+
+
+def test_meshes_that_cannot_be_drawn_for_one_reason_are_one_note() -> None:
+    looks = visual('<mesh filename="a.obj"/>') + "\n"
+    robot = read(link("a", MASS + BALL + looks * 2), drawn=undrawn_content("a.obj: too round"))
+    assert robot.notes == ("a visual is not drawn, a.obj (lines 2, 3): too round",)
 
 
 def test_a_bad_colour_is_no_error() -> None:

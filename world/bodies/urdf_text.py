@@ -91,7 +91,7 @@ def lines(robot: Robot) -> Iterator[str]:
         for shape in link.shapes:
             yield f"{indent}  {_shape_text(shape)}"
         if link.visuals:
-            yield f"{indent}  looks of {len(link.visuals)} part{'' if len(link.visuals) == 1 else 's'}"
+            yield f"{indent}  {len(link.visuals)} visual{'' if len(link.visuals) == 1 else 's'}"
     yield ""
     yield from robot.notes
     problem = free_base_problem(robot)
