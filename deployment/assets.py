@@ -8,13 +8,17 @@ which is that of its own file, or the one inside it that `assets:` names; a mesh
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from foosim.common import limits
-from foosim.deployment.loader import apply_sets, check_complete, load_deployment
+from foosim.common.finding import Finding, Location
+from foosim.common.names import nearest_name
+from foosim.deployment.loader import apply_sets, check_complete, load_deployment, refuse_findings
 from foosim.deployment.network.traces import file_settings
 from foosim.deployment.packages import read_mesh_file
+from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import AbsentFile, read_files
 from foosim.world.bodies.findings import BadRobot, listed
 from foosim.world.bodies.urdf import MJCF, SUFFIX, Robot, meshes_of, place_of_mesh, read_urdf
@@ -26,9 +30,14 @@ from foosim.world.scenery import SceneryMesh
 
 
 def asset_folder(file: Path) -> Path:
-    """The folder nearest to a URDF file in which all meshes are that it names by relative paths. Raises AssetError."""
-    meshes = read_xml(file.name, read_files(file.parent, ".", [file.name])[file.name]).below("mesh")
-    paths = [posixpath.normpath(mesh.attributes.get("filename", "")) for mesh in meshes]
+    """The folder nearest to a robot's file in which all meshes are that it names by relative paths. Raises AssetError."""
+    robot = read_xml(file.name, read_files(file.parent, ".", [file.name])[file.name])
+    meshes, key, within = robot.below("mesh"), "filename", ""
+    if file.suffix == MJCF:
+        key = "file"
+        for compiler in robot.all_of("compiler"):
+            within = compiler.attributes.get("meshdir", compiler.attributes.get("assetdir", within))
+    paths = [posixpath.normpath(posixpath.join(within, mesh.attributes.get(key, ""))) for mesh in meshes]
     up = max([path.split("/").count("..") for path in paths], default=0)
     return [file.parent, *file.parent.resolve().parents][up] if up else file.parent
 
@@ -96,18 +105,39 @@ def _robot(path: str, files: Mapping[str, bytes], absent: list[str]) -> Robot:
     return robot
 
 
+def _absent(deployment: Deployment, folder: Path, path: str) -> Iterator[Finding]:
+    """Yield the settings that name a file that does not exist, with the name nearest to it in its folder."""
+    where = folder / deployment.assets
+    beside: list[str] = []
+    with suppress(OSError):
+        beside = [one.name for one in (where / path).parent.iterdir() if one.suffix == Path(path).suffix]
+    nearest = nearest_name(posixpath.basename(path), sorted(beside))
+    named: list[tuple[Location, object]] = [(("robots", name), spec) for name, spec in deployment.robots.items()]
+    named += [(("scenery", name), spec) for name, spec in deployment.scenery.items()]
+    for place, setting in file_settings(deployment.network):
+        named.append((tuple([int(step) if step.isdigit() else step for step in place.split(".")]), setting))
+    for location, spec in named:
+        if getattr(spec, "file", None) == path:
+            yield Finding((*location, "file"), f"no such file in {where}", path, nearest)
+
+
 def pin_assets(text: str, name: str, folder: Path) -> tuple[str, dict[str, bytes]]:
     """The text with the digest of each file that it names, and the contents of these by path.
 
-    `folder` is the one that the deployment's file is in. Raises DeploymentError, also for a wall without a thickness,
-    and AssetError for an unacceptable file: the contents are read once, so the digests are of the contents checked.
+    `folder` is the one that the deployment's file is in. Raises DeploymentError, also for a wall without a thickness
+    and for a file that does not exist, and AssetError for an unacceptable one: the contents are read once, so the
+    digests are of the contents checked.
     """
     deployment = load_deployment(text, name)
     files: dict[str, bytes] = {}
     while wanted := deployment.wanted(files):
         for path in wanted:
             if path not in files:  # a mesh comes with its robot
-                files |= read_files(folder, deployment.assets, [path], files)
+                try:
+                    files |= read_files(folder, deployment.assets, [path], files)
+                except AbsentFile:
+                    refuse_findings(text, name, [*_absent(deployment, folder, path)])
+                    raise
             if path.endswith((SUFFIX, MJCF)):
                 absent = _read_meshes(folder, deployment.assets, path, files)
                 if absent:

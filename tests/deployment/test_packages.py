@@ -108,6 +108,15 @@ def test_a_relative_path_is_found_where_it_leads_and_nowhere_else(tmp_path: Path
         read_robot(file, None)
 
 
+def test_the_meshes_of_an_mjcf_file_are_where_its_compiler_says(tmp_path: Path) -> None:
+    mesh = '<compiler meshdir="../meshes"/><asset><mesh name="m" file="a.obj"/></asset>'
+    body = '<body><inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><geom type="mesh" mesh="m"/></body>'
+    text = f"<mujoco>{mesh}<worldbody>{body}</worldbody></mujoco>"
+    write(tmp_path, {"arm/robots/r.xml": text, "arm/meshes/a.obj": shard(1.0)})
+    assert asset_folder(tmp_path / "arm/robots/r.xml") == tmp_path / "arm"
+    assert width(tmp_path / "arm/robots/r.xml", None) == 1.0
+
+
 def test_a_link_on_the_way_to_a_package_is_not_followed(tmp_path: Path) -> None:
     write(tmp_path, {"ws/r.urdf": robot("package://arm/a.obj"), "elsewhere/a.obj": shard(1.0)})
     (tmp_path / "ws/arm").symlink_to(tmp_path / "elsewhere")
