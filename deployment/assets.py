@@ -30,7 +30,7 @@ from foosim.world.scenery import SceneryMesh
 
 
 def asset_folder(file: Path) -> Path:
-    """The folder nearest to a robot's file in which all meshes are that it names by relative paths. Raises AssetError."""
+    """The folder nearest to a robot's file with all meshes that it names by relative paths. Raises AssetError."""
     robot = read_xml(file.name, read_files(file.parent, ".", [file.name])[file.name])
     meshes, key, within = robot.below("mesh"), "filename", ""
     if file.suffix == MJCF:

@@ -45,7 +45,8 @@ def base_of(robot: Robot) -> tuple[bool, str]:
 
 def wheels_of(robot: Robot) -> list[str]:
     """Return the joints of wheels, of which there are several: links that turn without end, balanced about their axes,
-    and carry no moving ones. The axes of wheels are not vertical; vertical ones are of rotors, in a robot without wheels.
+    and carry no moving ones. The axes of wheels are not vertical: vertical ones are those of rotors, where a robot has
+    no wheels.
     """
     carriers: set[int] = set()
     for link in robot.links:
