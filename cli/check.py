@@ -129,6 +129,8 @@ def urdf(
     from foosim.world.bodies.urdf_text import as_json, lines
     from foosim.world.matter.mesh import AssetError
 
+    if file.is_dir():
+        raise AssetError(f"{file}: a folder, where a URDF file is needed")
     folder = asset_folder(file) if assets is None else assets
     try:
         robot = read_robot(file, folder)

@@ -1,8 +1,9 @@
 """Where the file of a mesh is that a robot's file names as `package://PACKAGE/PATH`: folders are searched for it.
 
 ROS finds packages by an index of its installations, which another machine has not. Here a package is a folder of its
-name: in the asset folder, around the robot's file in there, or above the asset folder. Last comes the package that the
-robot's file is in, whatever its folder is called. No link is followed (`read_files`), and only a mesh is looked for.
+name: in the asset folder, around the robot's file in there, or above the asset folder. Then comes the package that the
+robot's file is in, whatever its folder is called, and last a folder around the file whose name is in the path: of a
+package of which a part was copied, that is the part. No link is followed (`read_files`), and only a mesh is looked for.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ def read_mesh_file(folder: Path, assets: str, robot: str, content: bytes, mesh: 
             absent = absent or error
     assert absent is not None
     top = [*(folder / assets).resolve().parents][:ABOVE_MAX][-1:]
-    more = f", around {robot}, and in the folders above up to {top[0]}" if packaged and top else ""
-    raise AbsentFile(f"{absent}{more}")
+    around = f", around {robot}, and in the folders above up to {top[0]}" if packaged and top else ""
+    parts = ", by the whole path, or by what comes after a folder's name in it" if around else ""
+    raise AbsentFile(f"{absent}{around}{parts}")
 
 
 def _places(folder: Path, assets: str, robot: str, mesh: str) -> Iterator[tuple[Path, str, str]]:
@@ -53,3 +55,10 @@ def _places(folder: Path, assets: str, robot: str, mesh: str) -> Iterator[tuple[
     inside = mesh.partition("/")[2] or mesh
     yield from [(folder, assets, ancestor + inside) for ancestor in (*inner, "")]
     yield from [(parent, ".", inside) for parent in above if (parent / "package.xml").is_file()]
+    named = [(folder, assets, ancestor, ancestor.rstrip("/").rpartition("/")[2]) for ancestor in inner]
+    named.append((folder, assets, "", (folder / assets).resolve().name))
+    named += [(parent, ".", "", parent.name) for parent in above]
+    parts = mesh.split("/")
+    for root, place, ancestor, name in named:
+        tails = ["/".join(parts[number + 1 :]) for number, part in enumerate(parts[:-1]) if part == name]
+        yield from [(root, place, ancestor + tail) for tail in tails]

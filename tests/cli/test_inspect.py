@@ -56,7 +56,7 @@ def test_json_has_the_tree_in_si_units(inspected: Command) -> None:
     ("name", "content", "what"),
     [
         ("none.urdf", None, "none.urdf: No such file or directory"),
-        ("folder", b"", "folder: no regular file"),
+        ("folder", b"", "folder: a folder, where a URDF file is needed"),
         ("empty.urdf", b"", "empty.urdf:1: an empty file"),
         ("text.urdf", b"hello\n", "text.urdf:1: no XML, syntax error"),
         ("mimic.urdf", ARM.read_bytes().replace(b"<axis", b'<mimic joint="x"/><axis', 1), "no joint of this name to "),

@@ -111,6 +111,16 @@ def test_a_path_that_leads_out_is_refused_before_anything_is_opened(folder: Path
 LINKS: Final = ["parts/link.obj", "inside.obj", "away/secret.obj", "parts/loop.obj"]
 
 
+def test_a_file_that_does_not_exist_has_its_line_and_the_nearest_name(folder: Path) -> None:
+    scenery = "scenery: {wall: {shape: mesh, file: parts/shrad.obj, scale: 0.02, x: 5 m, surface: walls}}"
+    written = f"{TEXT}assets: models\n{scenery}\n"
+    place, column = f"table.yaml:{written.count(chr(10))}", scenery.index("parts") + 1
+    what = f"no such file in {folder / 'models'}, 'parts/shrad.obj', nearest is shard.obj"
+    with pytest.raises(DeploymentError) as refusal:
+        pin_assets(written, "table.yaml", folder)
+    assert refusal.value.problems == (f"{place}:{column}: scenery.wall.file: {what}",)
+
+
 @pytest.mark.parametrize("path", LINKS)
 def test_links_are_not_followed_wherever_they_lead(folder: Path, path: str) -> None:
     models = folder / "models"

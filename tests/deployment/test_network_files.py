@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from foosim.common.errors import DeploymentError
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.network.traces import file_settings, read_opportunities, read_table
@@ -74,7 +75,8 @@ def test_a_file_that_is_none_is_refused_with_its_line(tmp_path: Path, changed: d
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(AssetError, match=r"some\.dist: No such file"):
+    what = r"^\S+:\d+:\d+: network\.links\[0\]\.jitter\.file: no such file in .*, 'some\.dist'"
+    with pytest.raises(DeploymentError, match=what):
         pin_assets(text(), TABLE.name, tmp_path)
 
 

@@ -60,6 +60,26 @@ def test_a_mesh_of_a_package_is_found_where_packages_are(
     assert width(tmp_path / file, tmp_path / asset_root) == 1.0
 
 
+@pytest.mark.parametrize("asset_root", [".", "arm_description", "arm_description/urdf"])
+def test_a_part_of_a_package_that_was_copied_alone_has_its_meshes(tmp_path: Path, asset_root: str) -> None:
+    file, inside = "arm_description/urdf/r.urdf", "arm_description/meshes/a.obj"
+    write(tmp_path, {file: robot(f"package://all/robots/{inside}"), inside: shard(1.0), "arm/meshes/a.obj": shard(2.0)})
+    assert width(tmp_path / file, tmp_path / asset_root) == 1.0
+
+
+def test_missing_meshes_of_a_file_are_one_error(tmp_path: Path) -> None:
+    names = [f"m{number}.obj" for number in range(9)]
+    links = [robot(f"package://arm/{name}").replace('"a"', f'"{name}"') for name in names]
+    write(tmp_path, {"r.urdf": "".join(links).replace('</robot><robot name="r">', "")})
+    with pytest.raises(AssetError) as refusal:
+        read_robot(tmp_path / "r.urdf", tmp_path)
+    shown, lines = ", ".join(f"arm/{name}" for name in names[:8]), ", ".join(str(line) for line in range(3, 19, 2))
+    first, *others = str(refusal.value).splitlines()
+    what = f"r.urdf:3: 9 meshes that cannot be read: {shown}, ... (lines {lines}, ...): "
+    assert first.startswith(f"{what}No such file or directory in {tmp_path}, around r.urdf, ")
+    assert len(others) == 1 and "hang on none" in others[0]
+
+
 def test_places_too_deep_for_a_path_are_passed_over(tmp_path: Path) -> None:
     file, mesh = "a/b/c/d/robots/arm.urdf", "arm/meshes/visual/parts/a.obj"
     write(tmp_path, {f"ws/{file}": robot(f"package://{mesh}"), mesh: shard(1.0)})
@@ -88,6 +108,15 @@ def test_a_relative_path_is_found_where_it_leads_and_nowhere_else(tmp_path: Path
         read_robot(file, None)
 
 
+def test_the_meshes_of_an_mjcf_file_are_where_its_compiler_says(tmp_path: Path) -> None:
+    mesh = '<compiler meshdir="../meshes"/><asset><mesh name="m" file="a.obj"/></asset>'
+    body = '<body><inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><geom type="mesh" mesh="m"/></body>'
+    text = f"<mujoco>{mesh}<worldbody>{body}</worldbody></mujoco>"
+    write(tmp_path, {"arm/robots/r.xml": text, "arm/meshes/a.obj": shard(1.0)})
+    assert asset_folder(tmp_path / "arm/robots/r.xml") == tmp_path / "arm"
+    assert width(tmp_path / "arm/robots/r.xml", None) == 1.0
+
+
 def test_a_link_on_the_way_to_a_package_is_not_followed(tmp_path: Path) -> None:
     write(tmp_path, {"ws/r.urdf": robot("package://arm/a.obj"), "elsewhere/a.obj": shard(1.0)})
     (tmp_path / "ws/arm").symlink_to(tmp_path / "elsewhere")
@@ -104,7 +133,7 @@ def test_a_visual_that_cannot_be_drawn_is_noted_and_a_large_one_is_drawn(
     monkeypatch.setattr(limits, "ASSET_BYTES_MAX", 2000)
     assert len(drawn_content("b.obj", large)) < 200
     assert [len(link.visuals) for link in read_robot(tmp_path / "r.urdf", None).links] == [1]
-    for visual, reason in {"c.dae": "c.dae: 0 scenes", "d.stl": "d.stl: No such file"}.items():
+    for visual, reason in {"c.dae": "c.dae (line 2): 0 scenes", "d.stl": "d.stl (line 2): No such file"}.items():
         (tmp_path / "r.urdf").write_text(robot("a.obj", visual))
         found = read_robot(tmp_path / "r.urdf", None)
         assert [link.visuals for link in found.links] == [()]

@@ -388,7 +388,7 @@ BAD: Final[dict[str, tuple[bytes, str]]] = {
     "sdf": (b"<sdf version='1.7'/>", "1: no URDF: the outermost element is robot, 'sdf'"),
     "xacro": (
         b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">\n<xacro:include filename="a"/></robot>',
-        "2: a file of xacro, which makes a URDF file of it: xacro r.urdf > robot.urdf",
+        "2: a file of xacro, 'xacro:include', which makes a URDF file of it: xacro r.urdf > robot.urdf",
     ),
     "no links": (b"<robot/>", "1: a robot without links"),
     "no shapes": (b'<robot><link name="a"/></robot>', "1: a robot without a collision shape"),

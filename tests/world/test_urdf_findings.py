@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 import pytest
 
+from foosim.deployment.text.yaml import locate_in, plain, read_tree
 from foosim.world.bodies.findings import SHOWN_MAX, BadRobot
 from foosim.world.bodies.inertia import principal_of, solid, solid_of, turned
 from foosim.world.bodies.urdf import Robot, body_of, read_urdf
@@ -17,6 +18,7 @@ from foosim.world.bodies.urdf_base import base_of
 from foosim.world.bodies.urdf_text import as_json, snippet
 from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content
 from foosim.world.components.drives import Drives, Motor
+from foosim.world.components.joint_names import joint_indices
 from foosim.world.matter.mesh import AssetError, Mesh
 from foosim.world.scene import ORIGIN, UPRIGHT, Box, Mimic, Shape, Sphere, from_rpy
 from tests.solids import Solids, box, physics
@@ -199,7 +201,7 @@ def test_without_shapes_it_is_even_over_the_axes(moments: dict[str, str], used: 
     assert robot.links[1].inertia == pytest.approx((used,) * 3)
     (note,) = robot.notes
     shown = " and ".join((", ".join([moments["ixx"], moments["iyy"]]), moments["izz"]))
-    assert note.startswith(f"inertia of link b (line 3): principal moments of {shown} kg m2: ")
+    assert note.startswith(f"inertia of link b (line 3): principal moments of {shown} kg m2")
     assert f"; instead it has {used:.3g}, {used:.3g}, {used:.3g} kg m2, " in note, "both values"
 
 
@@ -315,6 +317,23 @@ def test_each_bad_element_has_its_line_in_one_error_and_their_count_is_bounded()
     assert len(str(many.value).splitlines()) == SHOWN_MAX + 1 and str(many.value).endswith("... and 8 more")
 
 
+@pytest.mark.parametrize("kind", ["hinge", "planar"])
+def test_a_joint_of_an_unknown_type_is_read_on_and_not_called_fixed(kind: str) -> None:
+    limits = limit(lower="1", upper="-1", effort="x", velocity="0") + '<axis xyz="0 0 0"/>'
+    joints = joint("j", "ab", limits + '<mimic joint="none"/>', kind), joint("k", "ac", mimic("j"))
+    with pytest.raises(BadRobot) as refusal:
+        read(link("a"), link("b"), link("c"), *joints)
+    errors = [line.removeprefix("r.urdf:5: ") for line in str(refusal.value).splitlines()]
+    assert [error.split(",")[0] for error in errors] == [
+        "an unknown type of joint",
+        "effort of limit is not a finite number",
+        "reversed limits: lower is 1",
+        "an axis without a direction",
+        "no joint of this name to follow",
+    ]
+    assert refusal.value.notes == ()
+
+
 def test_an_element_twice_is_one_and_blank_lines_above_the_head_are_passed_over() -> None:
     axis = '<axis xyz="0 0 1"/>'
     assert pair(LIMIT + axis + axis).links[1].axis == (0.0, 0.0, 1.0)
@@ -357,7 +376,6 @@ def test_looks_have_shapes_and_colours_of_their_own() -> None:
         (visual('<sphere radius="-1"/>'), "radius of sphere is not within 0.0001 to 1000, '-1'"),
         (visual("<cone/>"), "an unknown shape, there are box, sphere, cylinder, capsule, mesh, 'cone'"),
         (visual('<mesh filename="b.obj"/>'), "the file of a mesh is missing, 'b.obj'"),
-        (visual('<mesh filename="a.obj"/>'), "a.obj: too round"),
         (
             visual('<mesh filename="file:///a.obj"/>'),
             "a mesh is a path relative to this file, or package://PACKAGE/PATH, 'file:///a.obj'",
@@ -367,6 +385,12 @@ def test_looks_have_shapes_and_colours_of_their_own() -> None:
 def test_a_visual_that_cannot_be_drawn_is_no_error(looks: str, why: str) -> None:
     robot = read(link("a", MASS + BALL + looks), drawn=undrawn_content("a.obj: too round"))
     assert robot.notes == (f"a visual is not drawn (line 2): {why}",) and robot.links[0].visuals == ()
+
+
+def test_meshes_that_cannot_be_drawn_for_one_reason_are_one_note() -> None:
+    looks = visual('<mesh filename="a.obj"/>') + "\n"
+    robot = read(link("a", MASS + BALL + looks * 2), drawn=undrawn_content("a.obj: too round"))
+    assert robot.notes == ("a visual is not drawn, a.obj (lines 2, 3): too round",)
 
 
 def test_a_bad_colour_is_no_error() -> None:
@@ -385,12 +409,23 @@ def below(x: float, content: str = LIMIT) -> str:
 
 TWO: Final = (link("a"), link("b"), link("c"))
 SHIN: Final = MASS.replace("<mass", '<origin xyz="0 0 -0.3"/><mass') + BALL
+LEGS: Final = (
+    *TWO,
+    *(link(name) for name in "de"),
+    *(joint(ends, ends, below(float(ends in ("ac", "ce")))) for ends in ("ab", "ac", "bd", "ce")),
+)
+UPRIGHT_AXIS: Final = '<axis xyz="0 0 1"/>'
 BASES: Final[dict[str, tuple[bool, tuple[str, ...]]]] = {
     "an object": (False, (link("a"),)),
     "an arm": (True, (*TWO, joint("j", "ab"), joint("k", "bc"))),
     "wheels": (False, (*TWO, joint("j", "ab", "", "continuous"), joint("k", "ac", "", "continuous"))),
     "one wheel": (True, (*TWO, joint("j", "ab", "", "continuous"), joint("k", "bc", "", "continuous"))),
-    "legs": (False, (*TWO, joint("j", "ab", below(0.0)), joint("k", "ac", below(1.0)))),
+    "legs": (False, LEGS),
+    "a gripper that points down": (True, (*TWO, joint("j", "ab", below(0.0)), joint("k", "ac", below(1.0)))),
+    "rotors": (
+        False,
+        (*TWO, *(joint(name, ends, UPRIGHT_AXIS, "continuous") for name, ends in (("j", "ab"), ("k", "ac")))),
+    ),
     "one leg": (True, (*TWO, joint("j", "ab", below(0.0)), joint("k", "bc", below(1.0)))),
     "fingers": (True, (*TWO, joint("j", "ab", "", "fixed"), joint("k", "ac"))),
     "shins that turn without end": (
@@ -418,10 +453,34 @@ def test_a_base_is_proposed_to_be_fixed_where_nothing_carries_it(case: str) -> N
 
 def test_a_robot_is_proposed_to_stand_on_the_floor_with_its_wheels_by_speed() -> None:
     _, parts = BASES["wheels"]
-    text = snippet(read(*parts, link("d"), joint("arm", "ad")))
+    head = joint("head", "ae", UPRIGHT_AXIS, "continuous")
+    text = snippet(read(*parts, link("d"), link("e"), joint("arm", "ad"), head))
     assert "z: 100 mm" in text
-    assert 'wheels: {kind: joint_velocity, joints: ["j", "k"]}, joints: {kind: joint_position, joints: ["arm"]}' in text
+    assert 'wheels: {kind: joint_velocity, joints: ["j", "k"]}\n' in text
+    assert 'joints: {kind: joint_position, joints: ["arm", "head"]}\n' in text
     assert as_json(read(*parts))["fixed"] is False
+
+
+@pytest.mark.parametrize("arms", [30, 2])
+@pytest.mark.parametrize("named", ["arm_%d", "%d_of_arm", "%d"])
+def test_a_long_entry_is_on_several_lines_which_select_the_joints(arms: int, named: str) -> None:
+    wheels = [joint(f"wheel {number}", "ab", "", "continuous") for number in range(2)]
+    wheels[1] = wheels[1].replace('"b"', '"c"')
+    names = [named % number for number in range(arms)]
+    links = [link("x").replace('"x"', f'"x{number}"') for number in range(arms)]
+    joints = [joint(name, "ax").replace('"x"', f'"x{number}"') for number, name in enumerate(names)]
+    robot = read(*TWO, *links, *wheels, *joints)
+    text = snippet(robot)
+    assert max(map(len, text.split("\n"))) <= 100
+    tree, problems = read_tree(text, locate_in("page"))
+    assert tree is not None and not problems
+    actuators = plain(tree)["robots"]["r"]["actuators"]
+    body = body_of(robot, "r", ORIGIN, UPRIGHT, fixed=False, surfaces=repeat("default"))
+    for actuator, chosen in {"wheels": ["wheel 0", "wheel 1"], "joints": names}.items():
+        written = actuators[actuator]["joints"]
+        numbers = joint_indices(body, [written] if isinstance(written, str) else written, has_motors=True)
+        assert [robot.moving[number] for number in numbers] == chosen
+    assert ("*" in text) is (arms > 8 and named != "%d")
 
 
 def _text(robot: Robot) -> list[str]:

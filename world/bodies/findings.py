@@ -79,11 +79,12 @@ class Findings:
 
 
 def _note(what: str, why: str, places: Sequence[tuple[str, int]]) -> str:
-    names = _listed([*dict.fromkeys(name for name, _ in places if name)])
+    names = listed([*dict.fromkeys(name for name, _ in places if name)])
     lines = [*dict.fromkeys(str(line) for _, line in places)]
-    where = f"{'line' if len(lines) == 1 else 'lines'} {_listed(lines)}"
+    where = f"{'line' if len(lines) == 1 else 'lines'} {listed(lines)}"
     return f"{what}{' ' if names else ''}{names} ({where}): {why}"
 
 
-def _listed(texts: Sequence[str]) -> str:
+def listed(texts: Sequence[str]) -> str:
+    """Return texts with commas, at most `NAMED_MAX` of them."""
     return ", ".join(texts[:NAMED_MAX]) + (", ..." if len(texts) > NAMED_MAX else "")

@@ -213,7 +213,7 @@ def check_moments(mass: float, moments: Vector) -> None:
     low, middle, high = sorted(moments)
     shown = f"principal moments of {low:g}, {middle:g} and {high:g} kg m2"
     if low <= 0.0:
-        raise BadValue(f"{shown}: each is above 0")
+        raise BadValue(f"{shown}, valid are moments above 0")
     if high > (low + middle) * (1.0 + TRIANGLE_SHARE):
         raise BadValue(f"{shown}: no body has one above the sum of both others, {low + middle:g}")
     for moment in (low, high):

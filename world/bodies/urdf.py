@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
+from foosim.common.errors import show
 from foosim.world.bodies.findings import Findings
 from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of, without_rounding
 from foosim.world.bodies.urdf_joints import Following, JointPart, Tree, followers_of, in_tree, read_joint
@@ -152,33 +153,36 @@ def _robot_of(path: str, content: bytes) -> Element:
     robot = read_xml(path, content)
     macro = next(_macros(robot), None)
     if macro is not None or path.endswith(XACRO):
-        raise (macro or robot).error(unexpanded(path))
+        element, text = macro or (robot, "")
+        raise element.error(unexpanded(path, text))
     if robot.tag != "robot":
         raise robot.error("no URDF: the outermost element is robot", robot.tag)
     return robot
 
 
-def unexpanded(path: str) -> str:
-    """Return the problem of a file of xacro: the command that makes a URDF file of it."""
+def unexpanded(path: str, text: str = "") -> str:
+    """Return the problem of a file of xacro, with a text of it: the command that makes a URDF file of it."""
     name = path.rpartition("/")[2]
     out = name.removesuffix(XACRO).removesuffix(SUFFIX) + SUFFIX
     command = f"xacro {name} > {out if out != name else 'robot' + SUFFIX}"
-    return f"a file of xacro, which makes a URDF file of it: {command}"
+    return f"a file of xacro{f', {show(text)},' if text else ','} which makes a URDF file of it: {command}"
 
 
-def _macros(robot: Element) -> Iterator[Element]:
-    """Yield what is xacro's in a robot: its elements, and what it computes in a part that is read."""
+def _macros(robot: Element) -> Iterator[tuple[Element, str]]:
+    """Yield what is xacro's in a robot: its elements, and texts that it computes in a part that is read."""
     for child in robot.children:
         if child.tag.startswith("xacro:"):
-            yield child
+            yield child, child.tag
         elif child.tag in KNOWN["robot"]:
             yield from _computed(child)
 
 
-def _computed(element: Element) -> Iterator[Element]:
-    texts = element.attributes.values()
-    if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in texts):
-        yield element
+def _computed(element: Element) -> Iterator[tuple[Element, str]]:
+    if element.tag.startswith("xacro:"):
+        yield element, element.tag
+    for text in element.attributes.values():
+        if "${" in text or "$(" in text:
+            yield element, text
     for child in element.children:
         yield from _computed(child)
 

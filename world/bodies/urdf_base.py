@@ -2,8 +2,8 @@
 
 A base is free where nothing moves in it (an object), where two or more links at ends turn without limits about their
 middles (wheels, rotors), and where it stands on two or more moving parts (legs): each reaches down to the lowest point
-of the robot. It is fixed in all other cases (arms, grippers, pendulums), where the first link is called `world`, and
-where it has no mass.
+of the robot, and two legs have a knee. It is fixed in all other cases (arms, grippers, pendulums), where the first link
+is called `world`, and where it has no mass.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from foosim.world.bodies.urdf import Robot, free_base_problem, poses_of
-from foosim.world.scene import MOVING, Link, cross, dot, place, shape_box
+from foosim.world.scene import MOVING, Link, cross, dot, place, rotate, shape_box
 
 WHEELS_MIN: Final = 2
 """One joint that turns without end may be the last one of an arm."""
@@ -20,6 +20,8 @@ UNBALANCE: Final = 0.05
 """The greatest share that the distance of its centre of mass from its axis has in the inertia of a wheel: a shin that
 turns without end has more."""
 LEGS_MIN: Final = 2
+UPRIGHT_MIN: Final = 0.9
+"""The least share of the vertical in the axis of a rotor or head, not of a wheel, with all joints at 0."""
 LEVEL: Final = 0.05
 """The share of a robot's height by which the lowest points of its legs may differ."""
 
@@ -36,26 +38,33 @@ def base_of(robot: Robot) -> tuple[bool, str]:
     if wheels:
         return False, f"{len(wheels)} links turn without end, as wheels and rotors do"
     legs = _legs(robot)
-    if legs >= LEGS_MIN:
+    if legs >= LEGS_MIN and len(robot.moving) > LEGS_MIN:
         return False, f"it stands on {legs} moving links"
     return True, "it has no wheels and stands on no legs"
 
 
 def wheels_of(robot: Robot) -> list[str]:
     """Return the joints of wheels, of which there are several: links that turn without end, balanced about their axes,
-    and carry no moving ones."""
+    and carry no moving ones. The axes of wheels are not vertical: vertical ones are those of rotors, where a robot has
+    no wheels.
+    """
     carriers: set[int] = set()
     for link in robot.links:
         parent = link.parent if link.joint in MOVING else -1
         while parent >= 0:
             carriers.add(parent)
             parent = robot.links[parent].parent
-    wheels = [
-        link.joint_name
+    turning = [
+        number
         for number, link in enumerate(robot.links)
         if link.joint == "continuous" and link.mimic is None and number not in carriers and _is_balanced(link)
     ]
-    return wheels if len(wheels) >= WHEELS_MIN else []
+    poses = poses_of(robot.links)
+    wheels = [number for number in turning if abs(rotate(poses[number][1], robot.links[number].axis)[2]) < UPRIGHT_MIN]
+    for found in (wheels, turning):
+        if len(found) >= WHEELS_MIN:
+            return [robot.links[number].joint_name for number in found]
+    return []
 
 
 def _is_balanced(link: Link) -> bool:

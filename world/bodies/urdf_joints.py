@@ -77,7 +77,7 @@ class _Limit:
 def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> JointPart | None:
     """Return a joint between these links; None for one without a valid name or end."""
     name = findings.read("", name_of, joint)
-    kind = findings.read("fixed", _kind, joint)
+    kind = findings.read(None, _kind, joint)
     parent, child = (findings.read("", _end, joint, end, [*links]) for end in ("parent", "child"))
     if parent and parent == child:
         findings.error(joint, "a joint from a link to itself", parent)
@@ -91,7 +91,8 @@ def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> Join
             findings.note(follows, "passed over: mimic of joint", "it is fixed", name)
         return JointPart(name, joint, kind, parent, child, place)
     limit = _limit(joint, name, kind, findings)
-    if kind == "revolute" and limit.ends is None:
+    is_known = kind is not None
+    if kind is None or (kind == "revolute" and limit.ends is None):
         kind = "continuous"
     dynamics = findings.read(None, joint.one_of, "dynamics")
     damping = 0.0
@@ -103,7 +104,8 @@ def read_joint(joint: Element, links: Iterable[str], findings: Findings) -> Join
     if kind != "continuous" and ends[0] == ends[1]:
         findings.note(joint, f"limits {ends[0]:g} to {ends[1]:g} hold joint", "it is fixed there", name)
         return _held_at(found, ends[0])
-    _note_motor(found, findings)
+    if is_known:
+        _note_motor(found, findings)
     return found
 
 
@@ -162,12 +164,15 @@ def _axis(joint: Element) -> Vector:
     return x / length, y / length, z / length
 
 
-def _limit(joint: Element, name: str, kind: JointKind, findings: Findings) -> _Limit:
-    """Return the limit of a joint that moves; `ends` are None for one that turns without end."""
+def _limit(joint: Element, name: str, kind: JointKind | None, findings: Findings) -> _Limit:
+    """Return the limit of a joint that moves; `ends` are None for one that turns without end.
+
+    Of a joint of an unknown kind, None, only what is wrong in any kind is an error.
+    """
     found = _Limit()
     limit = findings.read(None, joint.one_of, "limit")
     if limit is None:
-        if kind != "continuous":
+        if kind not in ("continuous", None):
             findings.error(joint, f"a {kind} joint without limit", name)
         return found
     found.effort, found.speed = (
@@ -178,10 +183,10 @@ def _limit(joint: Element, name: str, kind: JointKind, findings: Findings) -> _L
     if "lower" not in limit.attributes and "upper" not in limit.attributes:
         if kind == "prismatic":
             findings.error(limit, "limit of a prismatic joint without lower and upper", name)
-        else:
+        elif kind == "revolute":
             findings.note(limit, "neither lower nor upper in the limit of joint", "it turns without end", name)
         return found
-    most = EXTENT_MAX_M if kind == "prismatic" else ANGLE_MAX_RAD
+    most = {"prismatic": EXTENT_MAX_M, "revolute": ANGLE_MAX_RAD}.get(kind or "", inf)
     low, high = (findings.read(0.0, number_of, limit, key, -inf, inf, 0.0) for key in ("lower", "upper"))
     if kind == "revolute" and low < -most and most < high:
         findings.note(limit, f"limits beyond {most:g} rad, of joint", "it turns without end", name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
 from json import dumps
 from math import ceil, inf
 from typing import Any
@@ -14,6 +15,12 @@ from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Mimic
 
 MOST_DIGITS = 6
 ROUNDING_M = 1e-6
+WIDTH = 100
+"""The count of characters of an entry that is one line."""
+ROW_WIDTH = 54
+"""The count of characters of names in a line of a list of joints."""
+NAMED_MAX = 8
+"""The count of joints that are listed by names where a pattern selects them."""
 FIXED_DEPTH_M = 1e-3
 """How deep in the floor the lowest point of a fixed robot may be."""
 
@@ -91,7 +98,7 @@ def lines(robot: Robot) -> Iterator[str]:
         for shape in link.shapes:
             yield f"{indent}  {_shape_text(shape)}"
         if link.visuals:
-            yield f"{indent}  looks of {len(link.visuals)} part{'' if len(link.visuals) == 1 else 's'}"
+            yield f"{indent}  {len(link.visuals)} visual{'' if len(link.visuals) == 1 else 's'}"
     yield ""
     yield from robot.notes
     problem = free_base_problem(robot)
@@ -115,14 +122,44 @@ def snippet(robot: Robot) -> str:
     parts = [("wheels", "joint_velocity", wheels), ("joints", "joint_position", others)]
     are_both = bool(wheels and others)
     shown = [
-        f"{part}: {{kind: {kind}{f', joints: {dumps(joints, ensure_ascii=False)}' if are_both else ''}}}"
+        f"{part}: {{kind: {kind}{f', joints: {_selection(joints, led)}' if are_both else ''}}}"
         for part, kind, joints in parts
         if joints
     ]
-    actuators = f", actuators: {{{', '.join(shown)}}}" if shown else ""
-    kind = "mjcf" if robot.file.endswith(MJCF) else "urdf"
-    base = f"at: {at}, fixed: {'true' if is_fixed else 'false'}"
-    return f"robots:\n  {name}: {{model: {kind}, file: {robot.file}, {base}{actuators}}}\n"
+    settings = [
+        f"model: {'mjcf' if robot.file.endswith(MJCF) else 'urdf'}",
+        f"file: {robot.file}",
+        f"at: {at}",
+        f"fixed: {'true' if is_fixed else 'false'}",
+    ]
+    actuators = [f"actuators: {{{', '.join(shown)}}}"] if shown else []
+    entry = f"  {name}: {{{', '.join([*settings, *actuators])}}}"
+    if len(entry) <= WIDTH and "\n" not in entry:
+        return f"robots:\n{entry}\n"
+    rows = [*(f"    {setting}" for setting in settings), *(["    actuators:"] if shown else [])]
+    return "\n".join(["robots:", f"  {name}:", *rows, *(f"      {actuator}" for actuator in shown), ""])
+
+
+def _selection(joints: Sequence[str], led: Sequence[str]) -> str:
+    """Return what selects some of the joints that have motors: their names, or of many one pattern if it does."""
+    if len(joints) > NAMED_MAX:
+        start, end = _common_start(joints), _common_start([name[::-1] for name in joints])[::-1]
+        pattern = f"{start}*{end}"
+        if not set("*?[") & {*start, *end} and [name for name in led if fnmatchcase(name, pattern)] == [*joints]:
+            return dumps(pattern, ensure_ascii=False)
+    *names, last = (dumps(name, ensure_ascii=False) for name in joints)
+    rows = [""]
+    for name in (*(f"{name}," for name in names), last):
+        if len(rows[-1]) + len(name) > ROW_WIDTH:
+            rows.append("")
+        rows[-1] += f"{' ' if rows[-1] else ''}{name}"
+    return f"[{rows[0]}]" if len(rows) == 1 else "[\n          " + "\n          ".join(rows) + "]"
+
+
+def _common_start(names: Sequence[str]) -> str:
+    first, last = min(names), max(names)
+    length = next((at for at, (one, other) in enumerate(zip(first, last, strict=False)) if one != other), len(first))
+    return first[:length]
 
 
 def _joint_text(robot: Robot, link: Link) -> str:

@@ -71,9 +71,9 @@ def _mesh_parts(
     scale = scale_of(mesh)
     parts, remark = drawn_parts(files[drawn])
     if remark and parts:
-        findings.note(mesh, "passed over: small triangles of visuals", f"of a mesh {TRIANGLES_MAX:,} are drawn")
+        findings.note(mesh, f"visuals with more than {TRIANGLES_MAX:,} triangles", f"{TRIANGLES_MAX:,} are drawn")
     elif remark:
-        findings.note(mesh, UNDRAWN, remark)
+        findings.note(mesh, f"{UNDRAWN},", remark.removeprefix(f"{path}: "), path)
     for vertices, triangles, colour in parts:
         placed = np.ascontiguousarray(vertices * scale)
         corners = triangles if scale[0] * scale[1] * scale[2] > 0.0 else np.ascontiguousarray(triangles[:, ::-1])
