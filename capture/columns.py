@@ -135,8 +135,8 @@ class Frames:
         return Frame(int(self.ticks[index]), self.layout, np.array(self.values[index]), self.outboxes[index])
 
     def column(self, entity: str, field: str, count: int | None = None, *, joint: str = "") -> Numbers:
-        """Return one field of an entity over time: (n,) for one number, (n, count) for several: all numbers of the field
-        or its first ones. Of a field with a number for each joint, as `joint_positions`, `joint` selects one, (n,).
+        """Return one field of an entity over time: (n,) for one number, (n, count) for several: all numbers of the
+        field, or its first ones. Of a field with a number for each joint, as `joint_positions`, `joint` selects one, (n,).
 
         Of a free body `position`, `orientation` and `linear_velocity` are of the origin of its first link, as on
         /tf and in its sensors' readings; `CENTRE_OF_SLOT` is of the link's centre of mass. The numbers are NaN

@@ -32,13 +32,15 @@ def _there_is_no_pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("words", [["check"], ["up"], ["rehearse", "--for=2ms"], ["match", "team", "team"]])
-def test_a_table_is_refused_at_the_line_of_its_engine(words: list[str], typed: Typed) -> None:
+def test_a_table_is_refused_at_the_line_of_its_engine(words: list[str], tmp_path: Path, typed: Typed) -> None:
     verb, *options = words
-    file = ["--deployment", TABLE] if verb == "match" else [TABLE]
+    table = tmp_path / "table.yaml"
+    table.write_text(TEXT)
+    file = ["--deployment", table] if verb == "match" else [table]
     done = typed()(verb, *options, *file)
     line = next(number for number, text in enumerate(TEXT.splitlines(), 1) if text.startswith("engine:"))
     assert done.code == 2
-    assert done.err.startswith(f"{TABLE}:{line}:9: engine: {LACK}: set engine: pure, or use Python 3.11; ")
+    assert done.err.startswith(f"{table}:{line}:9: engine: {LACK}: set engine: pure, or use Python 3.11; ")
 
 
 def test_also_where_it_names_none_and_no_other_engine_is(tmp_path: Path, typed: Typed) -> None:
