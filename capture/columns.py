@@ -136,7 +136,8 @@ class Frames:
 
     def column(self, entity: str, field: str, count: int | None = None, *, joint: str = "") -> Numbers:
         """Return one field of an entity over time: (n,) for one number, (n, count) for several: all numbers of the
-        field, or its first ones. Of a field with a number for each joint, as `joint_positions`, `joint` selects one, (n,).
+        field, or its first ones. Of a field with a number for each joint, as `joint_positions`, `joint` selects the one
+        of a joint, (n,).
 
         Of a free body `position`, `orientation` and `linear_velocity` are of the origin of its first link, as on
         /tf and in its sensors' readings; `CENTRE_OF_SLOT` is of the link's centre of mass. The numbers are NaN
