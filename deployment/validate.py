@@ -31,6 +31,7 @@ from foosim.world.assembly.sections import findings_of
 from foosim.world.assembly.versions import foreign_versions
 from foosim.world.component_types import registry
 from foosim.world.component_types.descriptions import (
+    ENGINES,
     JOINTS,
     JOINTS_MAX,
     ROBOTS,
@@ -533,7 +534,8 @@ def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                 having = model.fields_of(entity, deployment) if is_known else None
             except BadValue as bad:
                 value = entity.model if bad.value is ABSENT else bad.value
-                yield Finding((*place, "model"), bad.problem, value, bad.nearest)
+                path = bad.path if isinstance(bad, IncompatibleComponent) else ("model",)
+                yield Finding((*place, *path), bad.problem, value, bad.nearest)
                 continue
             for what in (*_needs_kit(model, kits, with_article(section[:-1])), *_model_problems(model)):
                 yield Finding((*place, "model"), what, entity.model)
@@ -581,7 +583,9 @@ def _component_problems(component_type: ComponentType, model: Model, has: Mappin
     if isinstance(component_type, Component) and (field := _trigger_of_model(component_type)) and field not in needs:
         needs = (*needs, field)
     missing = [] if has is None else [field for field in needs if field not in has and field not in model.on_demand]
-    if missing:
+    if model.declared is None and not {*JOINTS}.isdisjoint(missing):
+        yield f"{word} of joints on a robot without a joint that moves"
+    elif missing:
         fitting = ", ".join(_having(needs))
         valid = f"valid on: {fitting or 'none'}" + ("" if fitting else f"; {_fields_of(model, missing, has)}")
         yield f"{word} that {with_article(model.name)} cannot carry, for lack of {', '.join(missing)} ({valid})"
@@ -913,7 +917,7 @@ def _engine(spec: Deployment, ends: Names) -> Iterator[Finding]:
             what = f"{one.what}, which no engine solves beside {'.'.join(other.location)}, {other.what}"
             yield Finding(one.location, what, one.location[-1], at="key")
         return
-    wrong, needed = (sharing, "bullet") if engine.islands else (body, "mujoco")
+    wrong, needed = (sharing, "pure" if ENGINES["bullet"].lack else "bullet") if engine.islands else (body, "mujoco")
     if wrong is not None:
         place = ".".join(wrong.location)
         what = f"engine {engine.name!r} supports only {engine.bodies}; {place} is {wrong.what}: set engine: {needed}"

@@ -101,7 +101,7 @@ def _announce(options: ServeOptions, stem: str, tokens: Tokens) -> None:
     """Report the addresses of the page."""
     view = f"{stem}#view={tokens.view}"
     operate = "" if options.view_only else f"{stem}#operate={tokens.operate}"
-    text = f"console: {operate}, to look only: {view}" if operate else f"console: {view}"
+    text = f"console: {operate} (to look only: {view} )" if operate else f"console: {view}"
     if options.announce is not None:
         write_private(options.announce, encode_json({"view": view, "operate": operate, "text": text}))
         text = f"console: {stem}"  # others may read the log

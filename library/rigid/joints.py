@@ -39,7 +39,7 @@ class JointSettings(ActuatorSettings):
     """Drives joints of a robot.
 
     `joints` selects them by names or by patterns of these with `*`, in this order; without it they are all that have a
-    motor of their own.
+    motor of their own. A pattern passes over joints that follow others.
     """
 
     joints: Annotated[JointNames, Field(min_length=1, max_length=JOINTS_MAX)] | None = None

@@ -11,8 +11,9 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, StringConstraints
 
 from foosim.common import units
-from foosim.common.errors import BadValue, UnknownName
+from foosim.common.errors import BadValue
 from foosim.common.finding import Location
+from foosim.common.names import nearest_quoted
 from foosim.common.spec_base import PartName, default
 from foosim.common.units import Quantity, custom_error
 from foosim.world.bodies.urdf import (
@@ -30,7 +31,7 @@ from foosim.world.component_types.descriptions import BODY, CONTACTS, JOINTS
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
-from foosim.world.components.view import Mounting, WritableView
+from foosim.world.components.view import IncompatibleComponent, Mounting, WritableView
 from foosim.world.matter.physics import DEFAULT
 from foosim.world.placing import At
 from foosim.world.scene import MOVING, Body, Link
@@ -100,12 +101,13 @@ def slots_of(settings: UrdfRobot, spec: WorldSpec) -> dict[str, int]:
 
 
 def _surfaces(settings: UrdfRobot, robot: Robot) -> list[str]:
-    """Return the surface of each link. Raises UnknownName for a pattern that matches none."""
+    """Return the surface of each link. Raises IncompatibleComponent for a pattern that matches none."""
     chosen = settings.surface if isinstance(settings.surface, dict) else {"*": settings.surface}
     names = [link.name for link in robot.links]
     for pattern in chosen:
         if not any(fnmatchcase(name, pattern) for name in names):
-            raise UnknownName("a surface of no link", pattern, names)
+            what = f"a surface of no link; there are {', '.join(names)}"
+            raise IncompatibleComponent(("surface", pattern), what, pattern, nearest_quoted(pattern, names))
     matching = ([its for pattern, its in chosen.items() if fnmatchcase(name, pattern)] for name in names)
     return [(*found, DEFAULT)[0] for found in matching]
 

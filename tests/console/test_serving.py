@@ -47,7 +47,7 @@ def test_addresses_are_written_for_their_owner_alone(tmp_path: Path) -> None:
 def test_the_line_that_is_printed_has_the_addresses(capsys: pytest.CaptureFixture[str], view_only: bool) -> None:
     _announce(ServeOptions(view_only=view_only), "http://127.0.0.1:1/", TOKENS)
     view, operate = (f"http://127.0.0.1:1/#{what}" for what in (f"view={TOKENS.view}", f"operate={TOKENS.operate}"))
-    line = f"console: {view}" if view_only else f"console: {operate}, to look only: {view}"
+    line = f"console: {view}" if view_only else f"console: {operate} (to look only: {view} )"
     assert capsys.readouterr().out == f"{line}\n"
 
 

@@ -52,6 +52,11 @@ def test_also_where_it_names_none_and_no_other_engine_is(tmp_path: Path, typed: 
     assert typed()("check", DEPLOY / "yard.yaml").code == 0
 
 
+def test_a_table_with_another_engine_is_led_to_one_that_is_there(typed: Typed) -> None:
+    done = typed()("check", TABLE, "--set", "engine=mujoco")
+    assert done.code == 2 and ": set engine: pure, 'mujoco'" in done.err
+
+
 def test_nodes_on_other_machines_may_have_it(tmp_path: Path, typed: Typed) -> None:
     """What the launcher lacks is no matter then; the node whose machine lacks it takes no part, and says why."""
     assert typed()("check", DEPLOY / "cluster.yaml", "--set", "listen=127.0.0.1").code == 0

@@ -176,6 +176,31 @@ def test_what_a_component_needs_is_looked_for_in_the_robots_own_state(folder: Pa
     assert "robots.arm.sensors.where.kind: sensor that an urdf cannot carry, for lack of position, heading" in problem
 
 
+BALL: Final = b'<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+POST: Final = b'<robot name="post"><link name="Post">' + BALL + b"</link></robot>"
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (
+            "robots.cart.surface={Hul: default, wheel: default}",
+            "robots.cart.surface.Hul: a surface of no link; there are Hull, wheel, 'Hul', nearest is 'Hull'",
+        ),
+        (
+            "robots.post={model: urdf, file: models/post.urdf, fixed: true, actuators: {a: {kind: joint_velocity}}}",
+            "robots.post.actuators.a.kind: actuator of joints on a robot without a joint that moves, 'joint_velocity'",
+        ),
+    ],
+)
+def test_what_does_not_fit_the_links_of_the_file_is_refused_at_its_place(folder: Path, change: str, what: str) -> None:
+    (folder / "models" / "post.urdf").write_bytes(POST)
+    with pytest.raises(DeploymentError) as refused:
+        pin_assets(text_with(*ROBOTS, change), NAME, folder)
+    (problem,) = refused.value.problems
+    assert problem.endswith(what)
+
+
 def test_a_free_robot_needs_a_mass(folder: Path) -> None:
     light = ARM.replace(b'<mass value="4"/>', b'<mass value="0"/>', 1)
     for moment in (b"0.0129", b"0.0162"):

@@ -39,7 +39,8 @@ class ComponentError(Failed):
 
 
 class IncompatibleComponent(BadValue):
-    """A setting of a component that does not fit its robot or its world; `path` leads to it from the component's."""
+    """A setting of a component or robot that does not fit its robot or its world; `path` leads to it from the settings
+    of that component or robot."""
 
     def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
         super().__init__(what, value, nearest)
