@@ -187,6 +187,14 @@ def kinematic() -> dict[str, Any]:
     return found
 
 
+FINGER: Final = """<mujoco model="finger"><worldbody><body name="base">
+<geom type="box" size="0.05 0.05 0.05" mass="1"/>
+<body name="tip"><joint name="swing" axis="0 1 0" damping="0.01"/>
+<geom type="capsule" fromto="0.1 0 0 0.3 0 0" size="0.02" mass="0.2"/></body></body></worldbody></mujoco>
+"""
+"""A pendulum that begins level."""
+
+
 def robots_of_yard() -> dict[str, Any]:
     """Return robots of all kinds, in places of their own."""
     scan = {"kind": "laser_scanner", "rate": "10 Hz", "rays": 31, "range": "8 m"}
@@ -218,6 +226,7 @@ def robots_of_yard() -> dict[str, Any]:
             "at": {"x": "-2 m"},
             "sensors": {"scan": {**scan, "at": {"x": "20 cm", "z": "15 cm"}}, **OF_SCOUT},
         },
+        "finger": {"model": "mjcf", "file": "finger.xml", "fixed": True, "at": {"x": "6 m", "y": "-9 m", "z": "1 m"}},
         "crane-1": crane(-0.35, y=-6.0, reach="5 cm"),
         "crane-2": crane(0.35, y=-6.0, yaw_deg=180.0, reach="5 cm"),
         "way": head("joint_trajectory", {"y": "-9 m"}, patience="0.1 s", tolerance=1e-4),
@@ -297,4 +306,5 @@ def assets() -> Path:
     made = folder()
     for file in ("arm.urdf", "crane.urdf"):
         (made / "models" / file).write_bytes((DEPLOY / "models" / file).read_bytes())
+    (made / "models" / "finger.xml").write_text(FINGER)
     return made
