@@ -21,7 +21,7 @@ from foosim.deployment.packages import read_mesh_file
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.files import AbsentFile, read_files
 from foosim.world.bodies.findings import BadRobot, listed
-from foosim.world.bodies.urdf import MJCF, SUFFIX, Robot, meshes_of, place_of_mesh, read_urdf
+from foosim.world.bodies.urdf import MJCF, SUFFIX, Robot, is_packaged, meshes_of, place_of_mesh, read_urdf
 from foosim.world.bodies.urdf_links import MISSING
 from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content, undrawn_path
 from foosim.world.bodies.xml_tree import read_xml
@@ -37,7 +37,8 @@ def asset_folder(file: Path) -> Path:
         key = "file"
         for compiler in robot.all_of("compiler"):
             within = compiler.attributes.get("meshdir", compiler.attributes.get("assetdir", within))
-    paths = [posixpath.normpath(posixpath.join(within, mesh.attributes.get(key, ""))) for mesh in meshes]
+    named = [mesh.attributes.get(key, "") for mesh in meshes]
+    paths = [posixpath.normpath(posixpath.join(within, name)) for name in named if "://" not in name]
     up = max([path.split("/").count("..") for path in paths], default=0)
     above = [file.parent, *file.parent.resolve().parents]
     return above[min(up, len(above) - 1)]
@@ -68,7 +69,8 @@ def _read_meshes(folder: Path, assets: str, robot: str, files: dict[str, bytes])
         raw = undrawn_path(mesh)
         most = limits.VISUAL_BYTES_MAX if raw else limits.ASSET_BYTES_MAX
         try:
-            content = read_mesh_file(folder, assets, robot, files[robot], raw or mesh, most)
+            packaged = is_packaged(robot, files[robot], mesh)
+            content = read_mesh_file(folder, assets, robot, raw or mesh, most, packaged=packaged)
         except AssetError as error:
             if raw:
                 files[mesh] = undrawn_content(str(error))

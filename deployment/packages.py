@@ -8,8 +8,6 @@ package of which a part was copied, that is the part. No link is followed (`read
 
 from __future__ import annotations
 
-import posixpath
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -19,16 +17,13 @@ from foosim.world.scenery import path_problem
 
 ABOVE_MAX: Final = 5
 """The count of folders above the asset folder in which a package is looked for."""
-_NAMED: Final = re.compile(rb"package:/*([^\"'<>]+)")
 
 
-def read_mesh_file(folder: Path, assets: str, robot: str, content: bytes, mesh: str, bytes_max: int) -> bytes:
-    """Return the content of a mesh's file that the robot's file `robot`, with this content, names.
+def read_mesh_file(folder: Path, assets: str, robot: str, mesh: str, bytes_max: int, *, packaged: bool) -> bytes:
+    """Return the content of a mesh's file that the robot's file `robot` names, by its package or not.
 
     Paths are those inside the asset folder `assets` of a folder. Raises AssetError, AbsentFile where there is none.
     """
-    named = {posixpath.normpath(path) for path in _NAMED.findall(content)}
-    packaged = mesh.encode() in named
     absent: AbsentFile | None = None
     for root, inside, path in _places(folder, assets, robot, mesh) if packaged else [(folder, assets, mesh)]:
         if absent and path_problem(path):

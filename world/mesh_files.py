@@ -2,7 +2,8 @@
 
 Everything that a physics engine takes for granted is checked here, in Python, before one sees it: a face with an
 unknown vertex ends the process that hands it to Bullet. An invalid mesh raises `AssetError` with file, line and
-reason. Materials and textures are not read, so no file names another one. Pure: the content is given.
+reason. Of materials the colours of COLLADA alone are read, and no textures, so no file names another one. Pure: the
+content is given.
 
 OBJ and STL are read here, where each fault has its line: trimesh 5.2 takes a corner that counts back from its face as
 one that counts back from the end of the file, passes over lines with a tab, and takes a time that grows with the square

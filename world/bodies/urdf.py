@@ -19,7 +19,7 @@ from foosim.common.errors import show
 from foosim.world.bodies.findings import Findings
 from foosim.world.bodies.inertia import MassOf, combined, placed, principal_of, without_rounding
 from foosim.world.bodies.urdf_joints import Following, JointPart, Tree, followers_of, in_tree, read_joint
-from foosim.world.bodies.urdf_links import LinkPart, mesh_path, meshes_in, read_link
+from foosim.world.bodies.urdf_links import PACKAGE, LinkPart, mesh_path, meshes_in, read_link
 from foosim.world.bodies.urdf_masses import with_masses
 from foosim.world.bodies.urdf_values import name_of
 from foosim.world.bodies.urdf_visuals import first_colour, materials_of, read_visuals
@@ -89,7 +89,6 @@ class Robot:
         return sum(link.mass for link in self.links)
 
 
-@lru_cache(maxsize=KEPT)
 def meshes_of(path: str, content: bytes) -> tuple[str, ...]:
     """Return the files of the meshes that a URDF file names, in the asset folder: of collisions, and `drawn_path` of
     those of visuals. A mesh with an invalid path is left out. Raises AssetError."""
@@ -101,6 +100,12 @@ def place_of_mesh(path: str, content: bytes, mesh: str) -> str:
     return _mesh_elements(path, content)[mesh].place
 
 
+def is_packaged(path: str, content: bytes, mesh: str) -> bool:
+    """Whether a URDF file names a mesh by its package."""
+    return _mesh_elements(path, content)[mesh].attributes["filename"].startswith(PACKAGE)
+
+
+@lru_cache(maxsize=KEPT)
 def _mesh_elements(path: str, content: bytes) -> dict[str, Element]:
     robot = _robot_of(path, content)
     found: dict[str, Element] = {}
@@ -204,7 +209,7 @@ def _links(robot: Element, files: Mapping[str, bytes], findings: Findings) -> li
             findings.error(element, f"a link with the name of that of line {line}", link.name)
             continue
         links[link.name] = replace(link, visuals=looks)
-    if not robot.children or not any(robot.all_of("link")):
+    if not any(robot.all_of("link")):
         findings.error(robot, "a robot without links")
     elif shapes == 0:
         findings.error(robot, "a robot without a collision shape: nothing would touch it, nor see it")
