@@ -418,7 +418,7 @@ ENGINES: Final[dict[str, Engine]] = {
         needs="pybullet",
         where="has wheels for Python 3.11 alone",
         instead="set engine: pure, or use Python 3.11; pure resolves contacts one after the other, has no meshes, and "
-        "computes a close world with other digests",
+        "gives slightly different results with other digests",
     ),
     "mujoco": Engine(
         "mujoco", "foosim.node.physics.mujoco_islands:MujocoIslands", meshes=True, islands=True, grasps=True
