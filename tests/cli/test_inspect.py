@@ -61,6 +61,11 @@ def test_json_has_the_tree_in_si_units(inspected: Command) -> None:
         ("text.urdf", b"hello\n", "text.urdf:1: no XML, syntax error"),
         ("mimic.urdf", ARM.read_bytes().replace(b"<axis", b'<mimic joint="x"/><axis', 1), "no joint of this name to "),
         (
+            "up.urdf",
+            ARM.read_bytes().replace(b'<cylinder radius="0.09"', b'<mesh filename="' + 99 * b"../" + b'a.stl"', 2),
+            "a path inside the asset folder has no empty component, no . and no ..",
+        ),
+        (
             "mesh.urdf",
             ARM.read_bytes().replace(b'<cylinder radius="0.09" length="0.12"', b'<mesh filename="a.stl"', 2),
             "mesh.urdf:23: a mesh that cannot be read: a.stl: No such file",

@@ -133,6 +133,14 @@ def test_counts_are_few_and_their_quantiles_near(gaps: list[int]) -> None:
     ]
 
 
+def test_a_run_that_ends_before_its_first_closing_has_a_row_at_tick_0() -> None:
+    ages = Ages(2)
+    ages.joins("a", [("b", "c")])
+    ages.reached("a", "b", "c", 0)
+    ages.used("a", 0)
+    assert [age.tick for age in ages.unreported(-1)] == [0], "its log time is not below 0"
+
+
 def test_what_a_client_does_not_hear_is_not_counted_and_a_new_process_knows_nothing() -> None:
     ages = Ages(2)
     ages.joins("a", [("b", "c")])
