@@ -2,8 +2,9 @@
 
 The source stays in the wheel beside them and is what runs where they were not compiled: the same bits, more slowly.
 What is compiled is `COMPILED`. FOOSIM_COMPILE says what is wanted: `auto` (the default: whoever has no C compiler gets
-the source alone), `always` (fail without one), `quick` (as that, not optimised: for tests) or `never`. An editable
-install is never compiled, so that what is edited is what runs. All else about the package is in pyproject.toml.
+the source alone), `always` (fail without one), `quick` (as that, not optimised: for tests) or `never`. In an editable
+install no Python is compiled, so that what is edited is what runs. The kernels, which are written in C, are compiled in
+each install. All else about the package is in pyproject.toml.
 """
 
 from __future__ import annotations
@@ -158,10 +159,19 @@ def choice() -> str:
     return wanted
 
 
+def kernels() -> Extension:
+    """Return the extension of the kernels: C for Python 3.11 and any later one, by its stable interface."""
+    source = "kernels/kernels.c"  # it includes the others
+    options = ["-O2", *EXACT]
+    return Extension(f"{LIBRARY}.kernels._kernels", [source], extra_compile_args=options, py_limited_api=True)
+
+
 def extensions() -> list[Extension]:
     """Return the extensions of a build that makes some."""
-    if choice() == "never" or not {"bdist_wheel", "build", "build_ext", "install"} & set(sys.argv):
+    if choice() == "never":
         return []
+    if not {"bdist_wheel", "build", "build_ext", "install"} & set(sys.argv) or "--inplace" in sys.argv:
+        return [kernels()]
     from mypyc.build import mypycify
 
     say(f"mypyc makes C of {len(COMPILED)} modules; FOOSIM_COMPILE=never leaves that out")
@@ -180,7 +190,7 @@ def extensions() -> list[Extension]:
     for shim in shims:
         shim.sources, shim.extra_compile_args = [door], ["-O0", "-g0"]
     say(f"that took {time.monotonic() - begun_s:.0f} s; the C compiler runs on {cores()} cores")
-    return [library, *shims]
+    return [kernels(), library, *shims]
 
 
 def door_of(names: Sequence[str]) -> str:

@@ -33,9 +33,9 @@ ORDER: list[set[str]] = [
     {"capture"},
     {"runtime"},
     {"protocol"},
-    {"deployment", "painting"},
+    {"deployment", "painting", "rendering"},
     {"world"},
-    {"common"},
+    {"common", "kernels"},
 ]
 LEVELS = {package: level for level, packages in enumerate(ORDER) for package in packages}
 PACKAGES = sorted(LEVELS)

@@ -15,8 +15,20 @@ import pytest
 
 ROOT: Final = Path(__file__).parents[1]
 PACKAGES: Final = (
-    *("analysis", "capture", "cli", "client", "common", "console", "deployment", "launcher", "node", "painting"),
-    *("protocol", "runtime", "simulation", "supervisor", "vhub"),
+    *(
+        "analysis",
+        "capture",
+        "cli",
+        "client",
+        "common",
+        "console",
+        "deployment",
+        "kernels",
+        "launcher",
+        "node",
+        "painting",
+    ),
+    *("protocol", "rendering", "runtime", "simulation", "supervisor", "vhub"),
 )
 ENDINGS: Final = {".py", ".js", ".ts", ".mjs", ".html", ".css"}
 BUNDLES: Final = ("console", "www")

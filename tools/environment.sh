@@ -18,6 +18,13 @@ key() {
     cat pyproject.toml
 }
 
+# The kernels are compiled anew when their source changes, where a C compiler is.
+kernels() {
+    cat setup.py kernels/*.c | cksum | cmp -s - .venv/kernels && return
+    .venv/bin/python setup.py --quiet build_ext --inplace
+    cat setup.py kernels/*.c | cksum >.venv/kernels
+}
+
 # A Python 3.11 that uv fetches; its path is the output, all else goes to standard error.
 python_from_uv() {
     any=$(python_where 'v >= (3, 9)') || {
@@ -35,6 +42,7 @@ python_from_uv() {
 }
 
 if [ -x .venv/bin/python ] && [ "$(key)" = "$(cat .venv/key 2>/dev/null)" ]; then
+    kernels
     exit 0
 fi
 
@@ -90,6 +98,7 @@ if [ ! -e .venv/installed ]; then
     exit 1
 fi
 rm .venv/installed
+cat setup.py kernels/*.c | cksum >.venv/kernels
 step "done"
 # Last, so that an environment that was interrupted half-way is made anew.
 key >.venv/key
