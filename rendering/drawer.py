@@ -23,7 +23,7 @@ class Drawn(NamedTuple):
 
 
 class Drawer:
-    """Scenery and the fixed links of a scene are prepared once, those that move are placed for each picture.
+    """Scenery and the fixed links of a scene are prepared once, moving links are placed for each picture.
 
     `things` are the names of what is seen: entities by their index in the layout, then scenery (as `Caster.things`).
     """

@@ -1,6 +1,7 @@
 """The optics of a camera, and the numbers of links that move.
 
-A camera looks along the x axis of its mount; y is to the left, z up. A picture's rows go down, its columns to the right.
+A camera looks along the x axis of its mount; y is to the left, z up. A picture's rows go down, its columns
+to the right.
 """
 
 from __future__ import annotations
