@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 try:
-    from foosim.kernels import _kernels as _compiled
+    from foosim.kernels import _kernels as _compiled  # type: ignore[attr-defined]
 except ImportError:
     _compiled = None
 

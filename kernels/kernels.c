@@ -3,7 +3,12 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
-static PyMethodDef methods[] = {{NULL, NULL, 0, NULL}};
+#include "raster.c"
+
+static PyMethodDef methods[] = {
+    {"raster", raster, METH_VARARGS, NULL},
+    {NULL, NULL, 0, NULL},
+};
 
 static PyModuleDef_Slot slots[] = {{0, NULL}};
 

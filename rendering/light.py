@@ -1,0 +1,67 @@
+"""Light and sky: a sun that is far away, light from everywhere, and what is seen where nothing is.
+
+What a surface of a colour looks like depends on its facing alone, the cosine between its normal and the sun. Between
+the corners of a triangle the facing is the ratio of two planes over the picture, which perspective makes of it.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foosim.kernels.raster import Floats, Ints
+from foosim.world.scene import Vector
+
+Floats32 = NDArray[np.float32]
+Picture = NDArray[np.uint8]
+"""Red, green, blue and one byte unused, by pixel in a row."""
+
+SUN: Final[Vector] = (0.384, 0.288, 0.8772684879784524)
+"""The direction to the sun, of length 1."""
+AROUND: Final = np.float32(0.45)
+TILT: Final = np.float32(0.12)
+"""How much more of the light around reaches what faces the sun."""
+DIRECT: Final = np.float32(0.5)
+HORIZON: Final = np.array([206, 216, 228], np.float32)
+ZENITH: Final = np.array([116, 156, 210], np.float32)
+BELOW: Final = np.array([128, 130, 132], np.float32)
+
+
+def coloured(colours: Floats32, facing: Floats32, hidden: Floats32 | None = None) -> Picture:
+    """Return what surfaces of these colours (n, 3) look like; `hidden` (n,) is the share of the sun that is hidden."""
+    sun = DIRECT * np.maximum(facing, np.float32(0.0))
+    if hidden is not None:
+        sun *= np.float32(1.0) - hidden
+    light = AROUND + TILT * facing + sun
+    made = np.zeros((len(colours), 4), np.uint8)
+    for channel in range(3):
+        made[:, channel] = np.minimum(colours[:, channel] * light + np.float32(0.5), np.float32(255.0))
+    return made
+
+
+def facing_at(corners: Floats, facings: Floats, which: Ints, columns: Floats32, rows: Floats32) -> Floats32:
+    """Return how pixels face the sun. `corners` (t, 3, 3) are x, y, w of the corners of triangles (the pixel is
+    (x / w, y / w)), `facings` (t, 3) theirs, `which` (n,) the triangle that is at a pixel's place (n,)."""
+    planes = np.zeros((6, len(corners)))
+    for i in range(3):
+        (xj, yj, wj), (xk, yk, wk) = corners[:, i - 2].T, corners[:, i - 1].T
+        for n, part in enumerate((yj * wk - wj * yk, wj * xk - xj * wk, xj * yk - yj * xk)):
+            planes[n] += part * facings[:, i]
+            planes[3 + n] += part
+    a, b, c, d, e, f = planes.astype(np.float32)
+    above = a[which] * columns + b[which] * rows + c[which]
+    below = np.abs(d[which] * columns + e[which] * rows + f[which])
+    # From behind a surface faces the other way: there both planes have the other sign.
+    return np.clip(-above / np.maximum(below, np.float32(1e-30)), np.float32(-1.0), np.float32(1.0))
+
+
+def sky(up: Floats32, length: Floats32) -> Picture:
+    """Return what is seen in directions: `up` (n,) is their part along z, `length` (n,) their length."""
+    height = up / length
+    share = np.maximum(height, np.float32(0.0))[:, np.newaxis]
+    made = np.zeros((len(up), 4), np.uint8)
+    made[:, :3] = HORIZON + (ZENITH - HORIZON) * share + np.float32(0.5)
+    made[height < 0.0, :3] = BELOW
+    return made
