@@ -4,8 +4,10 @@
 #include <Python.h>
 
 #include "raster.c"
+#include "rays.c"
 
 static PyMethodDef methods[] = {
+    {"first_hits", first_hits, METH_VARARGS, NULL},
     {"raster", raster, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };

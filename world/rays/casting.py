@@ -2,7 +2,7 @@
 
 Rays that begin at one place are a bundle, as those of a scanner. A box around a bundle selects shapes, the sphere
 around each of these selects rays; only near pairs are computed exactly. Neither changes a distance, of which the least
-is taken.
+is taken. Where kernels were compiled, kernels/rays.c does the same.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.kernels import C
 from foosim.world.rays.boxes import Floats
 from foosim.world.rays.kernels import box_spans, capsule_spans, cylinder_spans, sphere_spans
 from foosim.world.rays.shapes import NOTHING, Placed
@@ -106,6 +107,10 @@ class Pairs(NamedTuple):
 
 def distances(placed: Placed, bundles: Bundles) -> Floats:
     """Return the distances of the first hits of rays (n,) (m); inf without a hit."""
+    if C is not None:
+        least = np.empty(bundles.ways.shape[1])
+        _compiled(placed, bundles, least, None)
+        return least
     least = np.full(bundles.ways.shape[1], np.inf)
     for pairs in _near(placed, bundles):
         np.minimum.at(least, pairs.rays, _entries(placed, bundles, pairs))
@@ -119,6 +124,10 @@ def cast(placed: Placed, bundles: Bundles) -> Hits:
     does not meet it.
     """
     count = bundles.ways.shape[1]
+    if C is not None:
+        hits = Hits(np.empty(count), np.empty(count, np.int64))
+        _compiled(placed, bundles, *hits)
+        return hits
     hits = Hits(np.full(count, np.inf), np.full(count, NOTHING, np.int64))
     for pairs in _near(placed, bundles):
         entries, before = _entries(placed, bundles, pairs), hits.distances[pairs.rays]
@@ -127,6 +136,18 @@ def cast(placed: Placed, bundles: Bundles) -> Hits:
         # Shapes of a ray are in their order: the last written one is the first of them.
         hits.things[pairs.rays[nearest]] = placed.things[pairs.shapes[nearest]]
     return hits
+
+
+def _compiled(placed: Placed, bundles: Bundles, least: Floats, things: NDArray[np.int64] | None) -> None:
+    """Write the distances of first hits, and the numbers of things, by the kernel."""
+    forms = placed.forms
+    C.first_hits(
+        *(placed.columns, placed.radii, forms.half, forms.forms, placed.things, forms.mesh_numbers),
+        tuple([triangles.arrays for triangles, _ in forms.meshes]),
+        *(np.ascontiguousarray(bundles.origins), np.ascontiguousarray(bundles.ranges)),
+        *(np.ascontiguousarray(bundles.passing), bundles.starts, bundles.lengths),
+        *(np.ascontiguousarray(bundles.ways), least, things),
+    )
 
 
 def _near(placed: Placed, bundles: Bundles) -> Iterator[Pairs]:

@@ -52,6 +52,10 @@ class Forms:
                 mesh = having.setdefault(id(triangles), (triangles, np.zeros(count, np.bool_)))
                 mesh[1][number] = True
         self.meshes = list(having.values())
+        self.mesh_numbers = np.full(count, NOTHING, np.int64)
+        """Of each shape, the number of its mesh in `meshes`."""
+        for mesh, (_, its) in enumerate(self.meshes):
+            self.mesh_numbers[its] = mesh
         self.primitives = sorted({*self.forms.tolist()} - {MESH})
         """The forms of the shapes, meshes aside."""
 
@@ -96,7 +100,7 @@ class Placed:
 
     def __init__(self, forms: Forms, columns: Floats, near: Sequence[SortedBoxes]) -> None:
         """`columns` are those of `Poses`, of all shapes; `near` are the boxes around them, with a margin, in a row."""
-        self.forms, self.things = forms, forms.things
+        self.forms, self.things, self.columns = forms, forms.things, columns
         self.positions, self.middles = columns[:3], columns[3:6]
         self.radii = forms.radii + MARGIN_M
         """Of the spheres around shapes, with a margin."""

@@ -90,6 +90,11 @@ class Triangles:
         return self._corners[:, :, blocks].reshape(3, 3, -1)
 
     @property
+    def arrays(self) -> tuple[Floats, Floats, bool]:
+        """The boxes around blocks and the corners of triangles, as they are stored; whether the mesh is closed."""
+        return self._boxes, self._corners, self.is_closed
+
+    @property
     def blocks(self) -> int:
         """The number of blocks of triangles."""
         return int(self._boxes.shape[2])

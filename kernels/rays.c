@@ -1,0 +1,332 @@
+/* The first hits of rays on placed shapes: world/rays/casting.py is the same in numpy, bit for bit.
+
+A ray is computed exactly on each shape that it comes near to, with the operations of the twin in their order. Which
+shapes those are is found otherwise: the sphere around a shape against a cone around PIECE rays, then against each ray.
+Neither changes a distance, of which the least is taken; of equal ones that of the first shape. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define PIECE 12 /* A narrower cone has fewer near shapes, and each cone costs a comparison with all. */
+#define BLOCK 32 /* Triangles in a block, as in triangles.py. */
+#define TOUCH_M 1e-9
+#define STEP_MIN 1e-30
+
+enum { BOX, CYLINDER, SPHERE, MESH, CAPSULE };
+
+typedef struct { double enter, leave; } Span;
+typedef struct { const double *boxes, *corners; int64_t blocks; int closed; } Mesh;
+typedef struct { double *places; size_t count, size; } Places;
+typedef struct { double position[3], rows[3][3], half[3]; int64_t form; const Mesh *mesh; } Shape; /* One in a row: near in memory. */
+typedef struct {
+    int64_t count;                          /* Shapes; each column below has a number for each. */
+    const double *columns, *radii, *half;   /* (15, count): positions, middles, rows; (count,); (3, count) */
+    const int64_t *forms, *things, *meshes; /* Of the last, the number of its mesh, -1 without one. */
+    const Mesh *mesh;
+    Shape *shapes;
+    Places hits;
+} Shapes;
+
+static const Span MISSED = {INFINITY, -INFINITY};
+
+static double lesser(double a, double b) { return a < b ? a : b; }
+static double greater(double a, double b) { return a > b ? a : b; }
+
+static Span in_box(const double *s, const double *w, const double *half) {
+    Span span = {-INFINITY, INFINITY};
+    for (int i = 0; i < 3; i++) {
+        if (w[i] == 0.0) {
+            if (!(-half[i] < s[i] && s[i] < half[i])) return MISSED;
+            continue;
+        }
+        double one = (-half[i] - s[i]) / w[i], other = (half[i] - s[i]) / w[i];
+        span.enter = greater(span.enter, lesser(one, other)), span.leave = lesser(span.leave, greater(one, other));
+    }
+    return span.enter < span.leave ? span : MISSED;
+}
+
+static Span in_sphere(double x, double y, double z, const double *w, double radius) {
+    double middle = -(x * w[0] + y * w[1] + z * w[2]);
+    x = x + middle * w[0], y = y + middle * w[1], z = z + middle * w[2];
+    double rest = radius * radius - (x * x + y * y + z * z);
+    if (!(rest > 0.0)) return MISSED;
+    double half = sqrt(rest);
+    return (Span){middle - half, middle + half};
+}
+
+static Span in_cylinder(const double *s, const double *w, double radius, double half_length) {
+    Span span = {-INFINITY, INFINITY};
+    double x = s[0], y = s[1], z = s[2], across = w[0] * w[0] + w[1] * w[1];
+    double divisor = across == 0.0 ? 1.0 : across;
+    double middle = -(x * w[0] + y * w[1]) / divisor;
+    x = x + middle * w[0], y = y + middle * w[1];
+    double rest = radius * radius - (x * x + y * y);
+    if (!(rest > 0.0)) return MISSED;
+    if (across != 0.0) {
+        double half = sqrt(rest / divisor);
+        span = (Span){middle - half, middle + half};
+    }
+    if (w[2] == 0.0) {
+        if (!(-half_length < z && z < half_length)) return MISSED;
+    } else {
+        double one = (-half_length - z) / w[2], other = (half_length - z) / w[2];
+        span.enter = greater(span.enter, lesser(one, other)), span.leave = lesser(span.leave, greater(one, other));
+    }
+    return span.enter < span.leave ? span : MISSED;
+}
+
+static Span in_capsule(const double *s, const double *w, double radius, double half_length) {
+    Span span = in_cylinder(s, w, radius, half_length);
+    for (int end = -1; end <= 1; end += 2) {
+        Span ball = in_sphere(s[0], s[1], s[2] - end * half_length, w, radius);
+        span.enter = lesser(span.enter, ball.enter), span.leave = greater(span.leave, ball.leave);
+    }
+    return span;
+}
+
+static double entry(double enter, double leave, double range) {
+    enter = enter > 0.0 ? enter : 0.0;
+    return lesser(leave, range) - enter > TOUCH_M ? enter : INFINITY;
+}
+
+static int is_left(double edge, double dx, double dy) {
+    return edge > 0.0 || (edge == 0.0 && (dy > 0.0 || (dy == 0.0 && dx < 0.0)));
+}
+
+static int compared(const void *a, const void *b) {
+    double one = *(const double *)a, other = *(const double *)b;
+    return (one > other) - (one < other);
+}
+
+/* Add where a line passes through the triangles of a block; return 0 without memory. */
+static int through_block(const Mesh *mesh, int64_t block, const double *s, const double *w, int along, Places *hits) {
+    int one = (along + 1) % 3, other = (along + 2) % 3;
+    double tilt_x = w[one] / w[along], tilt_y = w[other] / w[along];
+    const double *corner[3][3]; /* By coordinate, then corner; the coordinates are those seen along the line. */
+    const int axes[3] = {one, other, along};
+    for (int axis = 0; axis < 3; axis++)
+        for (int i = 0; i < 3; i++) corner[axis][i] = mesh->corners + ((axes[axis] * 3 + i) * mesh->blocks + block) * BLOCK;
+    for (int t = 0; t < BLOCK; t++) {
+        double x[3], y[3], z[3], edge[3];
+        int left = 0;
+        for (int i = 0; i < 3; i++) {
+            z[i] = corner[2][i][t] - s[along];
+            x[i] = (corner[0][i][t] - s[one]) - tilt_x * z[i];
+            y[i] = (corner[1][i][t] - s[other]) - tilt_y * z[i];
+        }
+        for (int i = 0; i < 3; i++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3;
+            edge[i] = x[a] * y[b] - x[b] * y[a];
+            left += is_left(edge[i], x[b] - x[a], y[b] - y[a]);
+        }
+        double area = edge[0] + edge[1] + edge[2];
+        if ((left != 0 && left != 3) || area == 0.0) continue;
+        if (hits->count == hits->size) {
+            size_t size = hits->size ? 2 * hits->size : 64;
+            double *places = realloc(hits->places, size * sizeof *places);
+            if (!places) return 0;
+            hits->places = places, hits->size = size;
+        }
+        hits->places[hits->count++] = (edge[0] * z[0] + edge[1] * z[1] + edge[2] * z[2]) / area / w[along];
+    }
+    return 1;
+}
+
+/* Return where a line enters a mesh, or passes a wall of an open one; NaN without memory. */
+static double into_mesh(const Mesh *mesh, const double *s, const double *w, double range, Places *hits) {
+    double step[3], least = INFINITY;
+    int along = 0;
+    for (int i = 0; i < 3; i++) {
+        step[i] = fabs(w[i]) < STEP_MIN ? STEP_MIN : w[i];
+        if (fabs(w[i]) > fabs(w[along])) along = i;
+    }
+    hits->count = 0;
+    for (int64_t block = 0; block < mesh->blocks; block++) {
+        double first = -INFINITY, last = INFINITY;
+        for (int i = 0; i < 3; i++) {
+            double one = (mesh->boxes[i * mesh->blocks + block] - s[i]) / step[i];
+            double other = (mesh->boxes[(3 + i) * mesh->blocks + block] - s[i]) / step[i];
+            first = greater(first, lesser(one, other)), last = lesser(last, greater(one, other));
+        }
+        if (first <= last && !through_block(mesh, block, s, w, along, hits)) return NAN;
+    }
+    if (mesh->closed) {
+        qsort(hits->places, hits->count, sizeof *hits->places, compared);
+        for (size_t i = 0; i + 1 < hits->count && least == INFINITY; i += 2)
+            least = entry(hits->places[i], hits->places[i + 1], range);
+    } else {
+        for (size_t i = 0; i < hits->count; i++)
+            if (hits->places[i] > 0.0 && hits->places[i] < range) least = lesser(least, hits->places[i]);
+    }
+    return least;
+}
+
+static void gather(Shapes *shapes) {
+    for (int64_t n = 0; n < shapes->count; n++) {
+        Shape *one = shapes->shapes + n;
+        for (int i = 0; i < 3; i++) {
+            one->position[i] = shapes->columns[i * shapes->count + n], one->half[i] = shapes->half[i * shapes->count + n];
+            for (int j = 0; j < 3; j++) one->rows[i][j] = shapes->columns[(6 + 3 * i + j) * shapes->count + n];
+        }
+        one->form = shapes->forms[n], one->mesh = shapes->meshes[n] < 0 ? NULL : shapes->mesh + shapes->meshes[n];
+    }
+}
+
+static void local(const Shape *shape, const double *vector, double *out) {
+    for (int i = 0; i < 3; i++)
+        out[i] = shape->rows[i][0] * vector[0] + shape->rows[i][1] * vector[1] + shape->rows[i][2] * vector[2];
+}
+
+/* Meet a shape with a ray whose start is known in its frame; NaN without memory. */
+static double meet(const Shape *shape, const double *start, const double *way, double range, Places *hits) {
+    double w[3];
+    const double *half = shape->half;
+    local(shape, way, w);
+    Span span;
+    switch (shape->form) {
+    case BOX: span = in_box(start, w, half); break;
+    case SPHERE: span = in_sphere(start[0], start[1], start[2], w, half[0]); break;
+    case CYLINDER: span = in_cylinder(start, w, half[0], half[2]); break;
+    case CAPSULE: span = in_capsule(start, w, half[0], half[2]); break;
+    default: return into_mesh(shape->mesh, start, w, range, hits);
+    }
+    return entry(span.enter, span.leave, range);
+}
+
+/* The middle of a sphere from the rays' start, its radius, the square of the way to where rays touch it, and that way. */
+typedef struct { int64_t shape; double x, y, z, radius, beyond, tangent, slack; } Near;
+
+/* Find the shapes within the range of a start, in their order. */
+static int64_t within(const Shapes *shapes, const double *start, double range, int64_t passed, double *squares, Near *near) {
+    const double *x = shapes->columns + 3 * shapes->count, *y = x + shapes->count, *z = y + shapes->count;
+    int64_t found = 0;
+    for (int64_t i = 0; i < shapes->count; i++) {
+        double dx = x[i] - start[0], dy = y[i] - start[1], dz = z[i] - start[2], reach = range + shapes->radii[i];
+        squares[i] = dx * dx + dy * dy + dz * dz - reach * reach * 1.000001;
+    }
+    for (int64_t i = 0; i < shapes->count; i++) {
+        if (squares[i] > 0.0 || shapes->things[i] == passed) continue;
+        double dx = x[i] - start[0], dy = y[i] - start[1], dz = z[i] - start[2], radius = shapes->radii[i];
+        double beyond = dx * dx + dy * dy + dz * dz - radius * radius;
+        double slack = 1e-9 * (fabs(dx) + fabs(dy) + fabs(dz) + 1.0);
+        near[found++] = (Near){i, dx, dy, dz, radius, beyond, beyond > 0.0 ? sqrt(beyond) : 0.0, slack};
+    }
+    return found;
+}
+
+/* Meet shapes with at most PIECE rays of one start, whose ways are (3, stride); return 0 without memory. */
+static int piece(Shapes *shapes, const Near *near, int64_t count, const double *start, const double *ways, int64_t stride,
+                 int rays, double range, double *distances, int64_t *things) {
+    double axis[3] = {0.0, 0.0, 0.0}, way[PIECE][3], length, cosine = 1.0, sine;
+    for (int k = 0; k < rays; k++)
+        for (int i = 0; i < 3; i++) axis[i] += way[k][i] = ways[i * stride + k];
+    length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+    int is_cone = length > 0.1 * rays;
+    if (is_cone) {
+        for (int i = 0; i < 3; i++) axis[i] /= length;
+        for (int k = 0; k < rays; k++)
+            cosine = lesser(cosine, axis[0] * way[k][0] + axis[1] * way[k][1] + axis[2] * way[k][2]);
+        cosine -= 1e-9;
+        is_cone = cosine > 0.0;
+    }
+    sine = sqrt(greater(1.0 - cosine * cosine, 0.0));
+    for (int64_t n = 0; n < count; n++) {
+        const Near *one = near + n;
+        const Shape *shape = shapes->shapes + one->shape;
+        /* Its middle is out of the cone by more than its radius: further from the axis than both angles together. */
+        if (is_cone && one->beyond > 0.0) {
+            double along = axis[0] * one->x + axis[1] * one->y + axis[2] * one->z;
+            if (along < cosine * one->tangent - sine * one->radius - one->slack) continue;
+        }
+        double begin[3];
+        int is_placed = 0;
+        for (int k = 0; k < rays; k++) {
+            double along = way[k][0] * one->x + way[k][1] * one->y + way[k][2] * one->z;
+            if (along < -one->radius || along * along < one->beyond) continue;
+            if (along - one->radius > lesser(range, distances[k])) continue; /* It is farther away than what was met. */
+            if (!is_placed) {
+                double from[3];
+                for (int i = 0; i < 3; i++) from[i] = start[i] - shape->position[i];
+                local(shape, from, begin);
+                is_placed = 1;
+            }
+            double distance = meet(shape, begin, way[k], range, &shapes->hits);
+            if (isnan(distance)) return 0;
+            if (distance < distances[k]) {
+                distances[k] = distance;
+                if (things) things[k] = shapes->things[one->shape];
+            }
+        }
+    }
+    return 1;
+}
+
+/* bundles: origins (3, count), ranges, passed, starts, lengths (count,); ways (3, rays). Out: (rays,) each. */
+static int cast_all(Shapes *shapes, int64_t count, const double *origins, const double *ranges, const int64_t *passed,
+                    const int64_t *starts, const int64_t *lengths, int64_t rays, const double *ways,
+                    double *distances, int64_t *things) {
+    Near *near = malloc((size_t)(shapes->count + 1) * sizeof *near);
+    double *squares = malloc((size_t)(shapes->count + 1) * sizeof *squares);
+    shapes->shapes = malloc((size_t)(shapes->count + 1) * sizeof *shapes->shapes);
+    int is_done = near && squares && shapes->shapes;
+    int64_t found = 0;
+    if (is_done) gather(shapes);
+    for (int64_t k = 0; k < rays; k++) {
+        distances[k] = INFINITY;
+        if (things) things[k] = -1;
+    }
+    for (int64_t b = 0; b < count && is_done; b++) {
+        const double start[3] = {origins[b], origins[count + b], origins[2 * count + b]};
+        int is_known = b > 0 && ranges[b] == ranges[b - 1] && passed[b] == passed[b - 1];
+        for (int i = 0; i < 3; i++) is_known = is_known && start[i] == origins[i * count + b - 1];
+        if (!is_known) found = within(shapes, start, ranges[b], passed[b], squares, near);
+        for (int64_t k = 0; k < lengths[b] && is_done; k += PIECE) {
+            int64_t at = starts[b] + k;
+            int size = lengths[b] - k < PIECE ? (int)(lengths[b] - k) : PIECE;
+            is_done = piece(shapes, near, found, start, ways + at, rays, size, ranges[b], distances + at, things ? things + at : NULL);
+        }
+    }
+    free(near), free(squares), free(shapes->shapes), free(shapes->hits.places);
+    return is_done;
+}
+
+/* first_hits(columns, radii, half, forms, things, mesh numbers, ((boxes, corners, is closed), ...), origins, ranges,
+passed, starts, lengths, ways, distances, things or None) */
+static PyObject *first_hits(PyObject *Py_UNUSED(self), PyObject *arguments) {
+    Py_buffer in[12], out, named = {0};
+    PyObject *meshes, *named_in;
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*O!y*y*y*y*y*y*w*O", in, in + 1, in + 2, in + 3, in + 4, in + 5,
+                          &PyTuple_Type, &meshes, in + 6, in + 7, in + 8, in + 9, in + 10, in + 11, &out, &named_in))
+        return NULL;
+    Py_ssize_t count = PyTuple_Size(meshes), parsed = 0;
+    Mesh *mesh = calloc((size_t)count + 1, sizeof *mesh);
+    Py_buffer *held = calloc(2 * (size_t)count + 1, sizeof *held);
+    int is_done = mesh && held && (named_in == Py_None || PyObject_GetBuffer(named_in, &named, PyBUF_WRITABLE) == 0);
+    if (!mesh || !held) PyErr_NoMemory();
+    for (; is_done && parsed < count; parsed++) {
+        Py_buffer *boxes = held + 2 * parsed;
+        if (!PyArg_ParseTuple(PyTuple_GetItem(meshes, parsed), "y*y*p", boxes, boxes + 1, &mesh[parsed].closed)) {
+            is_done = 0;
+            break;
+        }
+        mesh[parsed].boxes = boxes->buf, mesh[parsed].corners = boxes[1].buf;
+        mesh[parsed].blocks = boxes->len / (Py_ssize_t)(6 * sizeof(double));
+    }
+    if (is_done) {
+        Shapes shapes = {in[1].len / (Py_ssize_t)sizeof(double), in[0].buf, in[1].buf, in[2].buf, in[3].buf,
+                         in[4].buf, in[5].buf, mesh, NULL, {NULL, 0, 0}};
+        Py_BEGIN_ALLOW_THREADS;
+        is_done = cast_all(&shapes, in[7].len / (Py_ssize_t)sizeof(double), in[6].buf, in[7].buf, in[8].buf, in[9].buf,
+                           in[10].buf, out.len / (Py_ssize_t)sizeof(double), in[11].buf, out.buf, named.buf);
+        Py_END_ALLOW_THREADS;
+        if (!is_done) PyErr_NoMemory();
+    }
+    for (Py_ssize_t i = 0; i < 2 * parsed; i++) PyBuffer_Release(held + i);
+    for (int i = 0; i < 12; i++) PyBuffer_Release(in + i);
+    PyBuffer_Release(&out);
+    if (named.obj) PyBuffer_Release(&named);
+    free(mesh), free(held);
+    if (!is_done) return NULL;
+    Py_RETURN_NONE;
+}
