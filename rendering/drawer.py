@@ -8,15 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.kernels.raster import NONE, Floats, Ints, raster
+from foosim.rendering.lens import lens_of, sensed
 from foosim.rendering.light import Floats32, coloured, facing_at, sky
-from foosim.rendering.model import Model
+from foosim.rendering.model import Model, advanced
+from foosim.rendering.shadow import hidden, sun_over
 from foosim.rendering.view import View, focal_length, in_view, view_of
 from foosim.world.components.optics import Optics
 from foosim.world.layout import Layout
 from foosim.world.scene import Quaternion, Scene, Vector
 
+SUBFRAMES: Final = 9
+"""Of an exposure: the one in its middle gives depth and segmentation."""
 KEPT_PIXELS: Final = 1 << 22
-"""Of the pictures of what stands, which are kept for cameras that stand."""
+KEPT_VIEWS: Final = 32
+"""Of what stands, whose pictures are kept for cameras that stand."""
 
 
 class Drawn(NamedTuple):
@@ -49,7 +54,8 @@ class Drawer:
     def __init__(self, scene: Scene, layout: Layout) -> None:
         self._model = model = Model(scene, layout)
         self.things = model.things
-        self._flat = coloured(model.colours, np.zeros(len(model.colours), np.float32))
+        self._facing = np.zeros(len(model.triangles) + 1, np.float32)
+        self._flat = coloured(model.colours, self._facing)
         self._light(np.arange(len(model.triangles)))
         self._kept: dict[View, _Buffers] = {}
 
@@ -62,53 +68,74 @@ class Drawer:
         poses: NDArray[np.float64],
         velocities: NDArray[np.float64] | None = None,
         key: int = 0,
+        motion: NDArray[np.float64] | None = None,
     ) -> Drawn:
         """Return what a camera at a pose (m, world frame) sees.
 
         Of the links that move (`optics.moving_links`), those in view are given by `numbers` (n,), with the `poses` of
         their frames (n, 7): position (m) and orientation (x, y, z, w) in the world frame. `velocities` (n, 6) (m/s,
-        rad/s) blur them where the optics have an exposure. `key` is that of the draws of noise.
+        rad/s, world frame) blur them where the optics have an exposure, whose middle is the time of the poses; `motion`
+        (6,) is the velocity of the camera. `key` is that of the draws of noise.
         """
-        n = optics.samples
-        focal, width, height = focal_length(optics.fov, optics.width), optics.width, optics.height
-        view = view_of(position, orientation, focal * n, width * n, height * n, optics.near, optics.far)
-        nearness, triangles, colour = self._frame(view, numbers, poses)
-        return Drawn(
-            _mean(colour, n), *self._measured(nearness[n // 2 :: n, n // 2 :: n], triangles[n // 2 :: n, n // 2 :: n])
-        )
-
-    def _measured(
-        self, nearness: NDArray[np.float32], triangles: NDArray[np.int32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        seen = triangles != NONE
-        depth = np.divide(np.float32(1.0), nearness, out=np.zeros(nearness.shape, np.float32), where=seen)
-        return depth, self._model.thing[triangles] + np.int32(1)
+        own = np.array([[*position, *orientation]])
+        speeds = np.zeros((len(poses), 6)) if velocities is None else velocities
+        own_speed = np.zeros((1, 6)) if motion is None else motion.reshape(1, 6)
+        count = SUBFRAMES if optics.exposure > 0.0 and (speeds.any() or own_speed.any()) else 1
+        lens = lens_of(optics) if any(optics.distortion) else None
+        margin = (0, 0) if lens is None else lens.margin
+        total = np.zeros((optics.height + 2 * margin[1], optics.width + 2 * margin[0], 3), np.uint16)
+        n, middle = optics.samples, count // 2
+        for number in (*range(middle), *range(middle + 1, count), middle):
+            later_s = (number - middle) * optics.exposure / count
+            eye = advanced(own, own_speed, later_s)[0]
+            view = _view(optics, margin, eye)
+            frame = self._frame(view, optics, numbers, advanced(poses, speeds, later_s))
+            for i in range(n * n):
+                total += frame.colour[i // n :: n, i % n :: n, :3]
+        total += np.uint16(n * n * count // 2)
+        colour = (total // np.uint16(n * n * count)).astype(np.uint8)
+        nearness, triangles = frame.nearness[n // 2 :: n, n // 2 :: n], frame.numbers[n // 2 :: n, n // 2 :: n]
+        if lens is not None:
+            colour, nearness, triangles = lens.mixed(colour), lens.nearest(nearness, 0), lens.nearest(triangles, NONE)
+        depth = np.divide(np.float32(1.0), nearness, out=np.zeros_like(nearness), where=triangles != NONE)
+        return Drawn(sensed(colour, optics.gain, optics.noise, key), depth, self._model.thing[triangles] + np.int32(1))
 
     def _light(self, triangles: Ints) -> None:
-        """Give triangles the colours that they have where they are flat."""
-        facing = self._model.facing[self._model.triangles[triangles, 0]].astype(np.float32)
-        self._flat[triangles] = coloured(self._model.colours[triangles], facing)
+        """Give triangles the facing and the colours that they have where they are flat."""
+        self._facing[triangles] = self._model.facing[self._model.triangles[triangles, 0]]
+        self._flat[triangles] = coloured(self._model.colours[triangles], self._facing[triangles])
 
-    def _frame(self, view: View, numbers: NDArray[np.intp], poses: Floats) -> _Buffers:
+    def _frame(self, view: View, optics: Optics, numbers: NDArray[np.intp], poses: Floats) -> _Buffers:
         """Return the picture of a view."""
-        model = self._model
-        self._light(model.place(numbers, poses))
-        still = self._kept.pop(view, None) or self._standing(view)
-        self._kept[view] = still
-        while len(self._kept) > 1 and sum(view.width * view.height for view in self._kept) > KEPT_PIXELS:
-            del self._kept[next(iter(self._kept))]
-        buffers = still.copy()
-        self._raster(view, model.parts_of(numbers), buffers)
-        self._shade(view, np.flatnonzero(buffers.numbers != still.numbers), buffers)
+        self._light(self._model.place(numbers, poses))
+        parts = self._model.parts_of(numbers)
+        still, buffers = self._drawn(view, parts)
+        if optics.shadows:
+            sun = sun_over(view, self._model.bounds, optics.far)
+            shadows = self._drawn(sun, parts)[1].nearness
+            self._shade(view, np.flatnonzero(buffers.numbers != NONE), buffers, (sun, shadows))
+        else:
+            self._shade(view, np.flatnonzero(buffers.numbers != still.numbers), buffers)
         return buffers
 
+    def _drawn(self, view: View, parts: Ints) -> tuple[_Buffers, _Buffers]:
+        """Return the picture of what stands, which is kept, and a copy with moving parts, not yet coloured."""
+        still = self._kept.pop(view, None) or self._standing(view)
+        self._kept[view] = still
+        while len(self._kept) > KEPT_VIEWS or sum([view.width * view.height for view in self._kept]) > KEPT_PIXELS:
+            del self._kept[next(iter(self._kept))]
+        buffers = still.copy()
+        self._raster(view, parts, buffers)
+        return still, buffers
+
     def _standing(self, view: View) -> _Buffers:
-        """Return the picture of what stands."""
+        """Return the picture of what stands; one from the sun has no colours."""
         shape = view.height, view.width
-        colour = np.empty((*shape, 4), np.uint8)
+        colour = sky(view) if view.rays else np.zeros((0, 4), np.uint8)
         buffers = _Buffers(np.full(shape, view.start, np.float32), np.full(shape, NONE, np.int32), colour)
         self._raster(view, np.arange(self._model.standing), buffers)
-        self._shade(view, np.arange(view.width * view.height), buffers)
+        if view.rays:
+            self._shade(view, np.flatnonzero(buffers.numbers != NONE), buffers)
         return buffers
 
     def _raster(self, view: View, parts: Ints, buffers: _Buffers) -> None:
@@ -118,22 +145,27 @@ class Drawer:
         rows = 0, view.height
         raster(model.world, model.triangles, model.ranges[parts], matrix, view.near, rows, *buffers[:2])
 
-    def _shade(self, view: View, pixels: Ints, buffers: _Buffers) -> None:
-        """Colour some pixels, by what is at them."""
+    def _shade(
+        self, view: View, pixels: Ints, buffers: _Buffers, sun: tuple[View, NDArray[np.float32]] | None = None
+    ) -> None:
+        """Colour some pixels by what is at them, under the sun or with the shadows that its picture gives."""
         model, colour = self._model, buffers.colour.reshape(-1, 4)
         triangles = buffers.numbers.reshape(-1)[pixels]
-        colour.view(np.uint32)[pixels] = self._flat.view(np.uint32)[triangles]
         curved = np.flatnonzero(model.curved[triangles])
-        facing = self._facing(view, pixels[curved], triangles[curved])
-        colour[pixels[curved]] = coloured(model.colours[triangles[curved]], facing)
-        empty = pixels[triangles == NONE]
-        if len(empty):
-            columns, rows = _centres(view, empty)
-            _, first, across, down = np.array(view.rays).reshape(4, 3).astype(np.float32)
-            way = [first[i] + across[i] * columns + down[i] * rows for i in range(3)]
-            colour[empty] = sky(way[2], np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]))
+        facing = self._facing_of(view, pixels[curved], triangles[curved])
+        if sun is None:
+            colour.view(np.uint32)[pixels] = self._flat.view(np.uint32)[triangles]
+            colour[pixels[curved]] = coloured(model.colours[triangles[curved]], facing)
+            return
+        facings = self._facing[triangles]
+        facings[curved] = facing
+        share = np.zeros(len(pixels), np.float32)
+        lit = np.flatnonzero(facings > 0.0)
+        depth = np.float32(1.0) / buffers.nearness.reshape(-1)[pixels[lit]]
+        share[lit] = hidden(view, *sun, facings[lit], depth, *_centres(view, pixels[lit]))
+        colour[pixels] = coloured(model.colours[triangles], facings, share)
 
-    def _facing(self, view: View, pixels: Ints, triangles: NDArray[np.int32]) -> Floats32:
+    def _facing_of(self, view: View, pixels: Ints, triangles: NDArray[np.int32]) -> Floats32:
         """Return how pixels face the sun at which these triangles are seen."""
         model = self._model
         present = np.zeros(len(model.triangles), np.bool_)
@@ -148,17 +180,16 @@ class Drawer:
         return facing_at(clip, model.facing[corners], place[triangles], *_centres(view, pixels))
 
 
+def _view(optics: Optics, margin: tuple[int, int], pose: Floats) -> View:
+    """Return the view of a camera's samples at a pose (7,), with more columns and rows at each side."""
+    n = optics.samples
+    width, height = (optics.width + 2 * margin[0]) * n, (optics.height + 2 * margin[1]) * n
+    x, y, z, *orientation = pose.tolist()
+    focal = focal_length(optics.fov, optics.width) * n
+    return view_of((x, y, z), tuple(orientation), focal, width, height, optics.near, optics.far)
+
+
 def _centres(view: View, pixels: Ints) -> tuple[Floats32, Floats32]:
     """Return the columns and rows of the centres of pixels."""
     rows, columns = np.divmod(pixels.astype(np.int32), np.int32(view.width))
     return columns.astype(np.float32) + np.float32(0.5), rows.astype(np.float32) + np.float32(0.5)
-
-
-def _mean(colour: NDArray[np.uint8], n: int) -> NDArray[np.uint8]:
-    """Return the means of n x n samples, rounded."""
-    if n == 1:
-        return np.ascontiguousarray(colour[:, :, :3])
-    total = np.full((len(colour) // n, colour.shape[1] // n, 3), n * n // 2, np.uint16)
-    for i in range(n * n):
-        total += colour[i // n :: n, i % n :: n, :3]
-    return (total // (n * n)).astype(np.uint8)

@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.kernels.raster import Floats, Ints
-from foosim.world.scene import Vector
+from foosim.rendering.view import View
 
 Floats32 = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 """Red, green, blue and one byte unused, by pixel in a row."""
 
-SUN: Final[Vector] = (0.384, 0.288, 0.8772684879784524)
-"""The direction to the sun, of length 1."""
-AROUND: Final = np.float32(0.45)
+AROUND: Final = np.float32(0.52)
 TILT: Final = np.float32(0.12)
 """How much more of the light around reaches what faces the sun."""
 DIRECT: Final = np.float32(0.5)
@@ -57,11 +55,27 @@ def facing_at(corners: Floats, facings: Floats, which: Ints, columns: Floats32, 
     return np.clip(-above / np.maximum(below, np.float32(1e-30)), np.float32(-1.0), np.float32(1.0))
 
 
-def sky(up: Floats32, length: Floats32) -> Picture:
-    """Return what is seen in directions: `up` (n,) is their part along z, `length` (n,) their length."""
-    height = up / length
-    share = np.maximum(height, np.float32(0.0))[:, np.newaxis]
-    made = np.zeros((len(up), 4), np.uint8)
-    made[:, :3] = HORIZON + (ZENITH - HORIZON) * share + np.float32(0.5)
-    made[height < 0.0, :3] = BELOW
-    return made
+def sky(view: View) -> Picture:
+    """Return what is seen of a view where nothing is, (height, width, 4)."""
+    _, first, across, down = np.array(view.rays).reshape(4, 3)
+    columns, rows = np.arange(view.width) + 0.5, np.arange(view.height)[:, np.newaxis] + 0.5
+    up = (first[2] + across[2] * columns).astype(np.float32) + (down[2] * rows).astype(np.float32)
+    # Directions by column and by row are at right angles to the axis, along which all are 1 long.
+    aside, below = columns - 0.5 * view.width, rows - 0.5 * view.height
+    square = np.float32(view.pixel) * np.float32(view.pixel)
+    length = (aside * aside).astype(np.float32) + (below * below).astype(np.float32)
+    height = up / np.sqrt(length * square + np.float32(1.0))
+    words = SKY[(height * np.float32(256.0) + np.float32(256.0)).astype(np.int16)]
+    return np.asarray(words.view(np.uint8).reshape(*up.shape, 4))
+
+
+def _sky() -> NDArray[np.uint32]:
+    """Return the colours of directions by (1 + their part along z) * 256."""
+    made = np.zeros((513, 4), np.uint8)
+    share = np.arange(257, dtype=np.float32)[:, np.newaxis] / np.float32(256.0)
+    made[256:, :3] = HORIZON + (ZENITH - HORIZON) * share + np.float32(0.5)
+    made[:256, :3] = BELOW
+    return made.view(np.uint32).reshape(-1)
+
+
+SKY: Final = _sky()

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from math import sqrt
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.kernels.raster import Floats, Ints, runs
-from foosim.rendering.light import SUN
 from foosim.rendering.tessellation import corners_of
 from foosim.world.components.optics import moving_links
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import ORIGIN, UPRIGHT, Colour, Pose, Quaternion, Scene, Shape, Vector, looks_of
+
+SUN: Final[Vector] = (0.384, 0.288, 0.8772684879784524)
+"""The direction to the sun, of length 1."""
 
 
 class Model:
@@ -77,6 +80,16 @@ class Model:
         both = np.repeat(self.ranges[:, 4] != 0, building.counts)
         self.curved = np.append(curved | both, False)
         self._poses = np.full((len(self._links) - 1, 7), np.nan)
+        self.bounds = self._bounds()
+
+    def _bounds(self) -> tuple[Vector, float]:
+        """Return the middle and the radius of a sphere around what stands."""
+        low, high = np.zeros(3), np.zeros(3)
+        if self.standing:
+            reach, centres = self.radii[: self.standing, np.newaxis], self.centres[: self.standing]
+            low, high = (centres - reach).min(axis=0), (centres + reach).max(axis=0)
+        (x, y, z), (a, b, c) = ((low + high) * 0.5).tolist(), ((high - low) * 0.5).tolist()
+        return (x, y, z), sqrt(a * a + b * b + c * c)
 
     def place(self, numbers: NDArray[np.intp], poses: Floats) -> Ints:
         """Place moving links, by their numbers (n,) and poses (n, 7); return the triangles that moved since."""
@@ -151,6 +164,26 @@ class _Building:
         self.parts.append(_Part(thing, vertices, triangles, own, spans, middle, radius))
         self.counts.append(count)
         self.vertices, self.count = spans[1], spans[3]
+
+
+def advanced(poses: Floats, velocities: Floats, later_s: float) -> Floats:
+    """Return poses (n, 7) after a short time at velocities (n, 6), in the world frame."""
+    if later_s == 0.0:
+        return poses
+    moved = poses.copy()
+    moved[:, :3] += velocities[:, :3] * later_s
+    (a, b, c), (x, y, z, w) = velocities[:, 3:].T * (0.5 * later_s), poses[:, 3:].T
+    turned = [
+        x + a * w + b * z - c * y,
+        y + b * w + c * x - a * z,
+        z + c * w + a * y - b * x,
+        w - a * x - b * y - c * z,
+    ]
+    length = np.sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3])
+    is_turning = velocities[:, 3:].any(axis=1)
+    for i, part in enumerate(turned, 3):
+        moved[is_turning, i] = (part / length)[is_turning]
+    return moved
 
 
 def rotations(orientations: Floats) -> Floats:

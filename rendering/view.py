@@ -14,12 +14,13 @@ from foosim.world.scene import Quaternion, Vector
 
 
 class View(NamedTuple):
-    """`matrix` has the rows x, y, w, z of the kernel, `rows` the eye (m), then the direction at a pixel's column 0 and
-    row 0 and its change by column and by row, which is 1 along the axis. Nothing is seen that is nearer than `near` or
-    whose nearness is `start` or less."""
+    """`matrix` has the rows x, y, w, z of the kernel. `rays` are the eye (m), the direction at column 0 and row 0, and
+    its change by column and by row: 1 along the axis; `pixel` is the length of a change. Nothing is seen that is nearer
+    than `near` or whose nearness is `start` or less."""
 
     matrix: tuple[float, ...]
     rays: tuple[float, ...]
+    pixel: float
     near: float
     start: float
     width: int
@@ -44,7 +45,7 @@ def view_of(
         rows += [*row, -(row[0] * position[0] + row[1] * position[1] + row[2] * position[2])]
     corner = [a + (cx * b + cy * c) / focal for a, b, c in zip(ahead, left, up, strict=True)]
     rays = (*position, *corner, *(-b / focal for b in left), *(-c / focal for c in up))
-    return View((*rows, 0.0, 0.0, 0.0, 1.0), rays, near, 1.0 / far, width, height)
+    return View((*rows, 0.0, 0.0, 0.0, 1.0), rays, 1.0 / focal, near, 1.0 / far, width, height)
 
 
 def in_view(view: View, centres: Floats, radii: Floats) -> NDArray[np.bool_]:
