@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from functools import lru_cache
 from typing import Final, TypeVar
 
@@ -102,15 +103,17 @@ def _quantiles() -> Floats:
 
 
 QUANTILES: Final = _quantiles()
+KEY_BYTES: Final = 32
 
 
 def sensed(colour: NDArray[np.uint8], gain: float, noise: float, key: int) -> NDArray[np.uint8]:
-    """Return the values that a sensor gives: times `gain`, with normal noise of this standard deviation."""
+    """Return the values that a sensor gives: times `gain`, with normal noise of this standard deviation, by a key below
+    2^256."""
     if gain != 1.0:
         colour = np.minimum(np.floor(np.arange(256) * gain + 0.5), 255.0).astype(np.uint8)[colour]
     if noise > 0.0:
-        draws = np.random.Philox(key=key % (1 << 128)).random_raw((colour.size + 7) // 8)
-        places = draws.astype("<u8").view(np.uint8)[: colour.size].reshape(colour.shape)
+        draws = hashlib.shake_128(key.to_bytes(KEY_BYTES, "little")).digest(colour.size)
+        places = np.frombuffer(draws, np.uint8).reshape(colour.shape)
         offsets = np.floor(np.clip(QUANTILES * noise, -255.0, 255.0) + 0.5).astype(np.int16)
         colour = np.clip(colour + offsets[places], 0, 255).astype(np.uint8)
     return colour
