@@ -161,9 +161,11 @@ def choice() -> str:
 
 def kernels() -> Extension:
     """Return the extension of the kernels: C for Python 3.11 and any later one, by its stable interface."""
-    source = "kernels/kernels.c"  # it includes the others
-    options = ["-O2", *EXACT]
-    return Extension(f"{LIBRARY}.kernels._kernels", [source], extra_compile_args=options, py_limited_api=True)
+    files = sorted(map(str, Path("kernels").glob("*.c")))
+    options = ["-O3", "-fno-math-errno", *EXACT]
+    sources = ["kernels/kernels.c"]  # it includes the others
+    name = f"{LIBRARY}.kernels._kernels"
+    return Extension(name, sources, depends=files, extra_compile_args=options, py_limited_api=True)
 
 
 def extensions() -> list[Extension]:

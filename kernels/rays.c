@@ -9,6 +9,7 @@ Neither changes a distance, of which the least is taken; of equal ones that of t
 #include <string.h>
 
 #define PIECE 12 /* A narrower cone has fewer near shapes, and each cone costs a comparison with all. */
+#define SHELLS 32 /* About the start of rays, of equal width. */
 #define BLOCK 32 /* Triangles in a block, as in triangles.py. */
 #define TOUCH_M 1e-9
 #define STEP_MIN 1e-30
@@ -194,13 +195,15 @@ static double meet(const Shape *shape, const double *start, const double *way, d
     return entry(span.enter, span.leave, range);
 }
 
-/* The middle of a sphere from the rays' start, its radius, the square of the way to where rays touch it, and that way. */
-typedef struct { int64_t shape; double x, y, z, radius, beyond, tangent, slack; } Near;
+/* The sphere around a shape: its middle from the rays' start, its radius, the way to where rays touch it and its square,
+   a bound for rounding, and a place that no ray meets the shape before. */
+typedef struct { int64_t shape; double x, y, z, radius, tangent, beyond, slack, begin; } Near;
 
-/* Find the shapes within the range of a start, in their order. */
-static int64_t within(const Shapes *shapes, const double *start, double range, int64_t passed, double *squares, Near *near) {
+/* Find the shapes within the range of a start, the nearer ones first, but for those of one of SHELLS. */
+static int64_t within(const Shapes *shapes, const double *start, double range, int64_t passed, double *squares,
+                      Near *near, Near *unsorted) {
     const double *x = shapes->columns + 3 * shapes->count, *y = x + shapes->count, *z = y + shapes->count;
-    int64_t found = 0;
+    int64_t found = 0, ends[SHELLS + 1] = {0};
     for (int64_t i = 0; i < shapes->count; i++) {
         double dx = x[i] - start[0], dy = y[i] - start[1], dz = z[i] - start[2], reach = range + shapes->radii[i];
         squares[i] = dx * dx + dy * dy + dz * dz - reach * reach * 1.000001;
@@ -208,39 +211,57 @@ static int64_t within(const Shapes *shapes, const double *start, double range, i
     for (int64_t i = 0; i < shapes->count; i++) {
         if (squares[i] > 0.0 || shapes->things[i] == passed) continue;
         double dx = x[i] - start[0], dy = y[i] - start[1], dz = z[i] - start[2], radius = shapes->radii[i];
-        double beyond = dx * dx + dy * dy + dz * dz - radius * radius;
-        double slack = 1e-9 * (fabs(dx) + fabs(dy) + fabs(dz) + 1.0);
-        near[found++] = (Near){i, dx, dy, dz, radius, beyond, beyond > 0.0 ? sqrt(beyond) : 0.0, slack};
+        double square = dx * dx + dy * dy + dz * dz, beyond = square - radius * radius;
+        int shell = beyond > 0.0 ? (int)lesser((sqrt(square) - radius) / range * SHELLS, SHELLS - 1) : 0;
+        double slack = 1e-9 * (fabs(dx) + fabs(dy) + fabs(dz) + 1.0), tangent = beyond > 0.0 ? sqrt(beyond) : 0.0;
+        unsorted[found++] = (Near){i, dx, dy, dz, radius, tangent, beyond, slack, shell * range / SHELLS - slack};
+        ends[shell + 1]++;
     }
+    for (int i = 0; i < SHELLS; i++) ends[i + 1] += ends[i];
+    for (int64_t n = 0; n < found; n++)
+        near[ends[(int)((unsorted[n].begin + unsorted[n].slack) / range * SHELLS + 0.5)]++] = unsorted[n];
     return found;
+}
+
+/* A cone around rays from its tip; where they spread too far it is none, and nothing is outside of it. */
+typedef struct { double axis[3], cosine, sine; int is_some; } Cone;
+
+static Cone cone_around(const double *ways, int64_t stride, int64_t rays) {
+    Cone cone = {{0.0, 0.0, 0.0}, 1.0, 0.0, 0};
+    for (int64_t k = 0; k < rays; k++)
+        for (int i = 0; i < 3; i++) cone.axis[i] += ways[i * stride + k];
+    double length = sqrt(cone.axis[0] * cone.axis[0] + cone.axis[1] * cone.axis[1] + cone.axis[2] * cone.axis[2]);
+    if (length < 0.1 * (double)rays) return cone;
+    for (int i = 0; i < 3; i++) cone.axis[i] /= length;
+    for (int64_t k = 0; k < rays; k++) {
+        double along = cone.axis[0] * ways[k] + cone.axis[1] * ways[stride + k] + cone.axis[2] * ways[2 * stride + k];
+        cone.cosine = lesser(cone.cosine, along - 1e-9);
+    }
+    cone.is_some = cone.cosine > 0.0;
+    cone.sine = sqrt(greater(1.0 - cone.cosine * cone.cosine, 0.0));
+    return cone;
+}
+
+/* Whether a sphere is outside of a cone: its middle is further from the axis than both half angles together. */
+static int is_outside(const Cone *cone, const Near *one) {
+    double along = cone->axis[0] * one->x + cone->axis[1] * one->y + cone->axis[2] * one->z;
+    return cone->is_some && one->beyond > 0.0 && along < cone->cosine * one->tangent - cone->sine * one->radius - one->slack;
 }
 
 /* Meet shapes with at most PIECE rays of one start, whose ways are (3, stride); return 0 without memory. */
 static int piece(Shapes *shapes, const Near *near, int64_t count, const double *start, const double *ways, int64_t stride,
                  int rays, double range, double *distances, int64_t *things) {
-    double axis[3] = {0.0, 0.0, 0.0}, way[PIECE][3], length, cosine = 1.0, sine;
+    double way[PIECE][3], farthest = range; /* Where the last of the rays ends, as far as is known. */
+    int64_t first[PIECE] = {0};
+    Cone cone = cone_around(ways, stride, rays);
     for (int k = 0; k < rays; k++)
-        for (int i = 0; i < 3; i++) axis[i] += way[k][i] = ways[i * stride + k];
-    length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-    int is_cone = length > 0.1 * rays;
-    if (is_cone) {
-        for (int i = 0; i < 3; i++) axis[i] /= length;
-        for (int k = 0; k < rays; k++)
-            cosine = lesser(cosine, axis[0] * way[k][0] + axis[1] * way[k][1] + axis[2] * way[k][2]);
-        cosine -= 1e-9;
-        is_cone = cosine > 0.0;
-    }
-    sine = sqrt(greater(1.0 - cosine * cosine, 0.0));
-    for (int64_t n = 0; n < count; n++) {
+        for (int i = 0; i < 3; i++) way[k][i] = ways[i * stride + k];
+    for (int64_t n = 0; n < count && near[n].begin <= farthest; n++) {
         const Near *one = near + n;
+        if (is_outside(&cone, one)) continue;
         const Shape *shape = shapes->shapes + one->shape;
-        /* Its middle is out of the cone by more than its radius: further from the axis than both angles together. */
-        if (is_cone && one->beyond > 0.0) {
-            double along = axis[0] * one->x + axis[1] * one->y + axis[2] * one->z;
-            if (along < cosine * one->tangent - sine * one->radius - one->slack) continue;
-        }
         double begin[3];
-        int is_placed = 0;
+        int is_placed = 0, is_met = 0;
         for (int k = 0; k < rays; k++) {
             double along = way[k][0] * one->x + way[k][1] * one->y + way[k][2] * one->z;
             if (along < -one->radius || along * along < one->beyond) continue;
@@ -253,12 +274,18 @@ static int piece(Shapes *shapes, const Near *near, int64_t count, const double *
             }
             double distance = meet(shape, begin, way[k], range, &shapes->hits);
             if (isnan(distance)) return 0;
-            if (distance < distances[k]) {
-                distances[k] = distance;
-                if (things) things[k] = shapes->things[one->shape];
+            if (distance < distances[k] || (distance == distances[k] && one->shape < first[k])) {
+                distances[k] = distance, first[k] = one->shape;
             }
+            is_met |= distance < farthest;
         }
+        if (!is_met) continue;
+        farthest = distances[0];
+        for (int k = 1; k < rays; k++) farthest = greater(farthest, distances[k]);
+        farthest = lesser(farthest, range);
     }
+    for (int k = 0; k < rays && things; k++)
+        if (distances[k] < INFINITY) things[k] = shapes->things[first[k]];
     return 1;
 }
 
@@ -266,7 +293,7 @@ static int piece(Shapes *shapes, const Near *near, int64_t count, const double *
 static int cast_all(Shapes *shapes, int64_t count, const double *origins, const double *ranges, const int64_t *passed,
                     const int64_t *starts, const int64_t *lengths, int64_t rays, const double *ways,
                     double *distances, int64_t *things) {
-    Near *near = malloc((size_t)(shapes->count + 1) * sizeof *near);
+    Near *near = malloc(2 * (size_t)(shapes->count + 1) * sizeof *near), *some = near + shapes->count + 1;
     double *squares = malloc((size_t)(shapes->count + 1) * sizeof *squares);
     shapes->shapes = malloc((size_t)(shapes->count + 1) * sizeof *shapes->shapes);
     int is_done = near && squares && shapes->shapes;
@@ -280,11 +307,15 @@ static int cast_all(Shapes *shapes, int64_t count, const double *origins, const 
         const double start[3] = {origins[b], origins[count + b], origins[2 * count + b]};
         int is_known = b > 0 && ranges[b] == ranges[b - 1] && passed[b] == passed[b - 1];
         for (int i = 0; i < 3; i++) is_known = is_known && start[i] == origins[i * count + b - 1];
-        if (!is_known) found = within(shapes, start, ranges[b], passed[b], squares, near);
+        if (!is_known) found = within(shapes, start, ranges[b], passed[b], squares, near, some);
+        int64_t few = 0; /* Those of a whole bundle are found first, for its pieces. */
+        Cone cone = cone_around(ways + starts[b], rays, lengths[b]);
+        for (int64_t n = 0; n < found; n++)
+            if (!is_outside(&cone, near + n)) some[few++] = near[n];
         for (int64_t k = 0; k < lengths[b] && is_done; k += PIECE) {
             int64_t at = starts[b] + k;
             int size = lengths[b] - k < PIECE ? (int)(lengths[b] - k) : PIECE;
-            is_done = piece(shapes, near, found, start, ways + at, rays, size, ranges[b], distances + at, things ? things + at : NULL);
+            is_done = piece(shapes, some, few, start, ways + at, rays, size, ranges[b], distances + at, things ? things + at : NULL);
         }
     }
     free(near), free(squares), free(shapes->shapes), free(shapes->hits.places);
