@@ -90,10 +90,11 @@ class Drawer:
             eye = advanced(own, own_speed, later_s)[0]
             view = _view(optics, margin, eye)
             frame = self._frame(view, optics, numbers, advanced(poses, speeds, later_s))
-            for i in range(n * n):
+            for i in range(n * n if n * count > 1 else 0):
                 total += frame.colour[i // n :: n, i % n :: n, :3]
-        total += np.uint16(n * n * count // 2)
-        colour = (total // np.uint16(n * n * count)).astype(np.uint8)
+        colour = np.ascontiguousarray(frame.colour[:, :, :3])
+        if n * count > 1:
+            colour = ((total + np.uint16(n * n * count // 2)) // np.uint16(n * n * count)).astype(np.uint8)
         nearness, triangles = frame.nearness[n // 2 :: n, n // 2 :: n], frame.numbers[n // 2 :: n, n // 2 :: n]
         if lens is not None:
             colour, nearness, triangles = lens.mixed(colour), lens.nearest(nearness, 0), lens.nearest(triangles, NONE)
