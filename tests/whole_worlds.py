@@ -54,6 +54,12 @@ DRIVEN: Final = {
     "omni": ("x_y_w", (0.7, 0.7, 2.0)),
     "craft": ("waypoint", (3.0, 3.0, 0.0, 3.0)),
 }
+AROUND: Final[dict[str, Any]] = {
+    "sonar": {"kind": "sonar", "rate": "20 Hz", "range": "4 m", "at": {"z": "30 cm"}},
+    "nearby": {"kind": "nearby", "rate": "20 Hz", "range": "8 m", "tag": "vehicle"},
+    "map": {"kind": "terrain_map", "rate": "10 Hz", "length": "2 m", "width": "1 m", "resolution": "25 cm"},
+}
+"""Sensors of what is around the tug."""
 OF_COMMANDS: Final[dict[str, list[dict[str, Any]]]] = {
     "rover-1": [
         {"kind": "gaussian_noise", "std": "10 mm/s"},
@@ -117,6 +123,7 @@ def mixed() -> str:
     }
     for robot in ("tug", "omni", "craft"):
         data["robots"][robot]["sensors"] = {"velocity": {"kind": "velocity", "rate": "50 Hz"}, "warmth": WARMTH}
+    data["robots"]["tug"]["sensors"] |= AROUND
     data["robots"]["omni"]["rules"] = {"own": CELL}
     data["robots"]["craft"]["rules"] = {"skin": {"kind": "burns", "after": "100 ms"}}
     data["objects"] = {

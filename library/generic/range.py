@@ -99,10 +99,13 @@ class RangeFinders:
         return found
 
 
-def directions(cone: float) -> Iterator[Vector]:
-    """Yield unit vectors: the x axis, and those of a cone about it of this angle (rad) from side to side."""
+def directions(cone: float, circles: Sequence[tuple[float, int]] = CIRCLES) -> Iterator[Vector]:
+    """Yield unit vectors: the x axis, and those of a cone about it of this angle (rad) from side to side.
+
+    `circles` are shares of half of the angle, and the number of directions at that angle from the axis.
+    """
     yield 1.0, 0.0, 0.0
-    for share, beams in CIRCLES if cone > 0.0 else ():
+    for share, beams in circles if cone > 0.0 else ():
         aside, along = sin(share * cone / 2.0), cos(share * cone / 2.0)
         for beam in range(beams):
             around = 2.0 * pi * beam / beams
