@@ -63,8 +63,8 @@ class Sonar(Sensor):
     def __init__(self, settings: SonarSettings, at: Mounting) -> None:
         self.range_m, self._dead_zone_m = settings.range, settings.dead_zone
         self._least_cosine = cos(settings.incidence)
-        self._ways = np.array([one for way in directions(settings.cone, CIRCLES) for one in _with_two_beside(way)])
-        self._beams = BeamsTogether([Beams(at, settings.at, self._ways, settings.range)])
+        ways = [one for way in directions(settings.cone, CIRCLES) for one in _with_two_beside(way)]
+        self._ways, self._beams = np.array(ways), BeamsTogether([Beams(at, settings.at, ways, settings.range)])
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and the greatest distance (m); without an echo it is the greatest."""

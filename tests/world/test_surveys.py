@@ -24,7 +24,9 @@ def test_an_echo_comes_from_what_faces_the_sonar(fleet_text: Text) -> None:
         scenery = f"{{block: {{{block}}}}}"
         sonar = f"kind: sonar, range: 6 m, cone: {cone} deg, incidence: {incidence} deg, {HIGH}"
         (found,) = Robot(fleet_text, sonar, scenery=scenery).read()
-        nearest = max(turned - cone / 2.0, 0.0)  # of a beam that meets the wall at this angle, on the side of its normal
+        nearest = max(
+            turned - cone / 2.0, 0.0
+        )  # of a beam that meets the wall at this angle, on the side of its normal
         straight = 3.0 * cos(radians(turned)) - 0.01
         least = straight / cos(radians(nearest))
         if nearest <= incidence:
@@ -86,7 +88,9 @@ def test_entities_near_are_those_with_the_tag_by_distance(fleet_text: Text) -> N
     robot.set("rover03", (1.5, 0.0, 0.0))
     robot.set("rover04", (1.0, 2.0, 0.0))
     one = robot.sensor()
-    seen = one.codec.decode(one.codec.encode(one.sample(SensingView(0, robot.numbers, np.array(robot.numbers))))).entities
+    seen = one.codec.decode(
+        one.codec.encode(one.sample(SensingView(0, robot.numbers, np.array(robot.numbers))))
+    ).entities
     assert [its.name for its in seen] == ["rover04", "rover02"]
     for its, (ahead, left) in zip(seen, ((2.0, 0.0), (0.0, -4.0)), strict=True):
         assert its.distance == pytest.approx(sqrt(ahead * ahead + left * left + 1.0))

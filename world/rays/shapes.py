@@ -54,8 +54,8 @@ class Forms:
         self.meshes = list(having.values())
         self.mesh_numbers = np.full(count, NOTHING, np.int64)
         """Of each shape, the number of its mesh in `meshes`."""
-        for mesh, (_, its) in enumerate(self.meshes):
-            self.mesh_numbers[its] = mesh
+        for place, (_, its) in enumerate(self.meshes):
+            self.mesh_numbers[its] = place
         self.primitives = sorted({*self.forms.tolist()} - {MESH})
         """The forms of the shapes, meshes aside."""
 
