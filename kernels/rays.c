@@ -196,8 +196,8 @@ static double meet(const Shape *shape, const double *start, const double *way, d
 }
 
 /* The sphere around a shape: its middle from the rays' start, its radius, the way to where rays touch it and its square,
-   a bound for rounding, and a place that no ray meets the shape before. */
-typedef struct { int64_t shape; double x, y, z, radius, tangent, beyond, slack, begin; } Near;
+   a bound for rounding, its shell, and a place that no ray meets the shape before. */
+typedef struct { int64_t shape; double x, y, z, radius, tangent, beyond, slack, begin; int shell; } Near;
 
 /* Find the shapes within the range of a start, the nearer ones first, but for those of one of SHELLS. */
 static int64_t within(const Shapes *shapes, const double *start, double range, int64_t passed, double *squares,
@@ -212,14 +212,15 @@ static int64_t within(const Shapes *shapes, const double *start, double range, i
         if (squares[i] > 0.0 || shapes->things[i] == passed) continue;
         double dx = x[i] - start[0], dy = y[i] - start[1], dz = z[i] - start[2], radius = shapes->radii[i];
         double square = dx * dx + dy * dy + dz * dz, beyond = square - radius * radius;
-        int shell = beyond > 0.0 ? (int)lesser((sqrt(square) - radius) / range * SHELLS, SHELLS - 1) : 0;
+        /* Also of a range of 0 or without an end. */
+        int shell = beyond > 0.0 && range > 0.0 ? (int)lesser((sqrt(square) - radius) / range * SHELLS, SHELLS - 1) : 0;
         double slack = 1e-9 * (fabs(dx) + fabs(dy) + fabs(dz) + 1.0), tangent = beyond > 0.0 ? sqrt(beyond) : 0.0;
-        unsorted[found++] = (Near){i, dx, dy, dz, radius, tangent, beyond, slack, shell * range / SHELLS - slack};
+        unsorted[found++] = (Near){i, dx, dy, dz, radius, tangent, beyond, slack,
+                                   (shell ? shell * range / SHELLS : 0.0) - slack, shell};
         ends[shell + 1]++;
     }
     for (int i = 0; i < SHELLS; i++) ends[i + 1] += ends[i];
-    for (int64_t n = 0; n < found; n++)
-        near[ends[(int)((unsorted[n].begin + unsorted[n].slack) / range * SHELLS + 0.5)]++] = unsorted[n];
+    for (int64_t n = 0; n < found; n++) near[ends[unsorted[n].shell]++] = unsorted[n];
     return found;
 }
 

@@ -38,3 +38,12 @@ def test_the_kernel_and_numpy_have_the_same_bits(seed: int, monkeypatch: pytest.
     assert (by_kernel.things == by_numpy.things).all()
     assert fans.tobytes() == again.tobytes()
     assert 900 < np.isfinite(by_numpy.distances).sum() < 2900 and (by_numpy.distances == 0.0).sum() > 50
+
+
+def test_rays_without_a_length_meet_nothing_and_those_without_an_end_meet_what_long_ones_do() -> None:
+    rng = np.random.default_rng(9)
+    world = among(*crowd(rng, 70, 3.0))
+    starts, directions = vectors(rng, 200, 4.0), ways(rng, 200)
+    assert (world.cast(starts, directions, 0.0).distances == np.inf).all()
+    endless, long = (world.cast(starts, directions, far).distances for far in (np.inf, 1000.0))
+    assert (endless == long).all() and np.isfinite(long).sum() > 50
