@@ -15,3 +15,5 @@ except ImportError:
 
 C: Final[Any] = _compiled
 """The compiled functions; None without a C compiler."""
+KERNELS: Final = "compiled" if C is not None else "in numpy: the same bits, more slowly; no C compiler built them"
+"""What doctor reports of the kernels."""

@@ -39,6 +39,7 @@ from foosim.common.errors import Malformed, Refused, describe
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.processes import joint_processes, processes_of
 from foosim.deployment.schema import Deployment, places
+from foosim.kernels import KERNELS
 from foosim.launcher.hosts import (
     NOT_FOUND,
     NOT_RUNNABLE,
@@ -142,7 +143,8 @@ def _processes(case: Case) -> Iterator[_Row]:
 
 
 def _versions(case: Case) -> Iterator[_Row]:
-    """Versions of foosim, Python and each library against the requirements; whether the hot path is compiled."""
+    """Versions of foosim, Python and each library against the requirements; whether hot path and kernels
+    are compiled."""
     yield "foosim", "fine", f"{importlib.metadata.version('foosim')}, protocol {limits.PROTOCOL_VERSION}", ""
     python = platform.python_version()
     if PYTHONS[0] <= sys.version_info[:2] <= PYTHONS[1]:
@@ -152,6 +154,7 @@ def _versions(case: Case) -> Iterator[_Row]:
         yield "python", "warning", f"{python}; foosim supports {first} to {last}", f"install Python {last}"
     slower = "interpreted: the same bits, more slowly; installed by pip, where there is a C compiler, it is compiled"
     yield "hot path", "fine", "compiled" if is_compiled() else slower, ""
+    yield "kernels", "fine", KERNELS, ""
     for line in importlib.metadata.requires("foosim") or ():
         wanted = Requirement(line)
         if wanted.marker is None or wanted.marker.evaluate({"extra": ""}):

@@ -19,6 +19,7 @@ from foosim.common.errors import Failed, Refused
 from foosim.common.new_run import NEW_RUN
 from foosim.deployment.processes import Process, process_of
 from foosim.deployment.schema import Player
+from foosim.kernels import KERNELS, C
 from foosim.launcher.commands import Commands, kinds_of
 from foosim.launcher.console_child import ConsoleChild
 from foosim.launcher.display import Display, recovery_text
@@ -164,6 +165,8 @@ class Up:
         display.say(f"run {folder.name}, logs in {folder.logs}")
         if self.plan.branch is not None:
             display.say(self.plan.branch.text)
+        if C is None:
+            display.say(f"kernels of rays and pictures run {KERNELS}")
         for process in self.plan.processes.values():
             if len(process.roles) > 1:
                 display.say(f"process {process.name} has {', '.join(process.roles)}")

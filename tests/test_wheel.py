@@ -202,7 +202,8 @@ def test_compiled_and_interpreted_are_one_world(
     installed: Installed, compiled_runs: Path, tmp_path: Path, name: str
 ) -> None:
     """Equal frames, fates and rows, to the last bit."""
-    assert list(installed.packages.glob("foosim/world/rays/spans.*.so"))
+    for compiled in ("world/rays/spans", "kernels/_kernels"):
+        assert list(installed.packages.glob(f"foosim/{compiled}.*.so"))
     (file, ticks, sets), capture = RUNS[name], tmp_path / "interpreted.mcap"
     deployment = ROOT / "deploy" / file
     rehearse(deployment.read_text(), file, ticks, None, sets, capture=capture, folder=deployment.parent)
