@@ -8,6 +8,7 @@
 
 static PyMethodDef methods[] = {
     {"first_hits", first_hits, METH_VARARGS, NULL},
+    {"turned", turned, METH_VARARGS, NULL},
     {"raster", raster, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };

@@ -362,3 +362,25 @@ static PyObject *first_hits(PyObject *Py_UNUSED(self), PyObject *arguments) {
     if (!is_done) return NULL;
     Py_RETURN_NONE;
 }
+
+/* turned(orientations, directions, ways): `shapes.rotated` of directions (count, rays, 3) by (4, count): (3, count, rays). */
+static PyObject *turned(PyObject *Py_UNUSED(self), PyObject *arguments) {
+    Py_buffer orientations, directions, ways;
+    if (!PyArg_ParseTuple(arguments, "y*y*w*", &orientations, &directions, &ways)) return NULL;
+    int64_t count = orientations.len / (Py_ssize_t)(4 * sizeof(double));
+    int64_t all = directions.len / (Py_ssize_t)(3 * sizeof(double)), rays = count ? all / count : 0;
+    const double *q = orientations.buf, *in = directions.buf;
+    double *out = ways.buf;
+    for (int64_t n = 0; n < count; n++) {
+        double qx = q[n], qy = q[count + n], qz = q[2 * count + n], qw = q[3 * count + n];
+        for (int64_t k = n * rays; k < (n + 1) * rays; k++) {
+            double x = in[3 * k], y = in[3 * k + 1], z = in[3 * k + 2];
+            double tx = 2.0 * (qy * z - qz * y), ty = 2.0 * (qz * x - qx * z), tz = 2.0 * (qx * y - qy * x);
+            out[k] = x + qw * tx + (qy * tz - qz * ty);
+            out[all + k] = y + qw * ty + (qz * tx - qx * tz);
+            out[2 * all + k] = z + qw * tz + (qx * ty - qy * tx);
+        }
+    }
+    PyBuffer_Release(&orientations), PyBuffer_Release(&directions), PyBuffer_Release(&ways);
+    Py_RETURN_NONE;
+}

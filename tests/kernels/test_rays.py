@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from foosim.kernels import C
-from foosim.world.rays import casting
+from foosim.world.rays import casting, shapes
 from tests.world.test_rays import among, crowd, somewhere, vectors, ways
 
 pytestmark = pytest.mark.skipif(C is None, reason="no C compiler was there when foosim was installed")
@@ -16,13 +16,13 @@ pytestmark = pytest.mark.skipif(C is None, reason="no C compiler was there when 
 def test_the_kernel_and_numpy_have_the_same_bits(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also of rays along axes, on surfaces, from inside, and of fans of any width."""
     rng = np.random.default_rng(seed)
-    shapes = [*crowd(rng, 70, 3.0), *crowd(rng, 7, 0.0)]
-    world = among(*shapes)
+    things = [*crowd(rng, 70, 3.0), *crowd(rng, 7, 0.0)]
+    world = among(*things)
     starts, directions = vectors(rng, 3000, 4.0), ways(rng, 3000)
     axes = np.concatenate((np.eye(3), -np.eye(3)))
     directions[:600] = axes[rng.integers(0, 6, 600)]
     starts[:300] = np.round(starts[:300] * 2.0) / 2.0
-    starts[300:400] = np.array([shape.position for shape in shapes])[rng.integers(0, len(shapes), 100)]
+    starts[300:400] = np.array([shape.position for shape in things])[rng.integers(0, len(things), 100)]
     for begin, length in ((1000, 40), (1040, 12), (1052, 361), (1500, 1)):
         starts[begin : begin + length] = somewhere(rng, 3.0)
     directions[1052:1413] = np.linspace(directions[1052], directions[1413], 361)
@@ -47,3 +47,11 @@ def test_rays_without_a_length_meet_nothing_and_those_without_an_end_meet_what_l
     assert (world.cast(starts, directions, 0.0).distances == np.inf).all()
     endless, long = (world.cast(starts, directions, far).distances for far in (np.inf, 1000.0))
     assert (endless == long).all() and np.isfinite(long).sum() > 50
+
+
+def test_directions_are_turned_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(10)
+    turns, directions = rng.normal(size=(4, 30)), rng.normal(size=(30, 20, 3))
+    by_kernel = shapes.rotated_each(turns, directions)
+    monkeypatch.setattr(shapes, "C", None)
+    assert by_kernel.tobytes() == shapes.rotated_each(turns, directions).tobytes()

@@ -16,7 +16,7 @@ from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting, SensingView, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
-from foosim.world.rays.shapes import rotated
+from foosim.world.rays.shapes import rotated_each
 from foosim.world.rays.solids import Meshes, solid_of
 from foosim.world.scene import Body, Link, Vector, shape_box
 
@@ -66,7 +66,7 @@ class BeamsTogether(Rows):
     def lines(self, numbers: Sequence[float], values: Floats | None = None) -> tuple[Floats, Floats]:
         """Return where mounts are (3, sensors) and the ways of beams (3, sensors, beams), in the world frame."""
         places, turns = self._mounts.poses(numbers, values)
-        return places, rotated(turns[:, :, None], self._directions.transpose(2, 0, 1))
+        return places, rotated_each(turns, self._directions)
 
 
 def body_of(at: Mounting) -> Body:

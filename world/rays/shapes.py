@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.kernels import C
 from foosim.world.matter.mesh import Mesh
 from foosim.world.rays.boxes import MARGIN_M, Floats
 from foosim.world.rays.solids import CAPSULE, CYLINDER, MESH, SPHERE, Meshes, form_of
@@ -123,6 +124,15 @@ def rotated(orientations: Floats, vectors: Floats) -> Floats:
     return np.array(
         (x + qw * tx + (qy * tz - qz * ty), y + qw * ty + (qz * tx - qx * tz), z + qw * tz + (qx * ty - qy * tx))
     )
+
+
+def rotated_each(orientations: Floats, vectors: Floats) -> Floats:
+    """Return `rotated` of some vectors (n, r, 3) by each of n quaternions (4, n): (3, n, r)."""
+    if C is None:
+        return rotated(orientations[:, :, None], vectors.transpose(2, 0, 1))
+    found = np.empty((3, *vectors.shape[:2]))
+    C.turned(np.ascontiguousarray(orientations), np.ascontiguousarray(vectors), found)
+    return found
 
 
 def multiplied(ones: Floats, others: Floats) -> Floats:
