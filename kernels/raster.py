@@ -43,24 +43,9 @@ def raster(
     sides. `matrix` is (4, 4); what has w < `near` is not drawn. `rows` are the first and the end of those drawn.
     """
     height, width = numbers.shape
-    if C is None:
-        raster_in_numpy(world, triangles, ranges, matrix, near, rows, nearness, numbers)
-    else:
+    if C is not None:
         C.raster(world, triangles, ranges, matrix, near, width, height, *rows, nearness, numbers)
-
-
-def raster_in_numpy(
-    world: Floats,
-    triangles: NDArray[np.int32],
-    ranges: NDArray[np.int32],
-    matrix: Floats,
-    near: float,
-    rows: tuple[int, int],
-    nearness: NDArray[np.float32],
-    numbers: NDArray[np.int32],
-) -> None:
-    """Do what `raster` does."""
-    height, width = numbers.shape
+        return
     which = runs(ranges[:, 2], ranges[:, 3])
     both = np.repeat(ranges[:, 4] != 0, ranges[:, 3] - ranges[:, 2])
     x, y, z = world.T

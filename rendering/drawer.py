@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from foosim.kernels.raster import NONE, Floats, Ints, raster
 from foosim.rendering.lens import lens_of, sensed
 from foosim.rendering.light import Floats32, coloured, facing_at, sky
-from foosim.rendering.model import Model, advanced
+from foosim.rendering.model import Model, advanced, check_poses
 from foosim.rendering.shadow import hidden, sun_over
 from foosim.rendering.view import View, focal_length, in_view, view_of
 from foosim.world.components.optics import Optics
@@ -18,7 +18,7 @@ from foosim.world.layout import Layout
 from foosim.world.scene import Quaternion, Scene, Vector
 
 SUBFRAMES: Final = 9
-"""Of an exposure: the one in its middle gives depth and segmentation."""
+"""Of an exposure: the last one, at the time of the poses, gives depth and segmentation."""
 KEPT_PIXELS: Final = 1 << 22
 KEPT_VIEWS: Final = 32
 """Of what stands, whose pictures are kept for cameras that stand."""
@@ -68,28 +68,26 @@ class Drawer:
         poses: NDArray[np.float64],
         velocities: NDArray[np.float64] | None = None,
         key: int = 0,
-        motion: NDArray[np.float64] | None = None,
     ) -> Drawn:
         """Return what a camera at a pose (m, world frame) sees.
 
         Of the links that move (`optics.moving_links`), those in view are given by `numbers` (n,), with the `poses` of
         their frames (n, 7): position (m) and orientation (x, y, z, w) in the world frame. `velocities` (n, 6) (m/s,
-        rad/s, world frame) blur them where the optics have an exposure, whose middle is the time of the poses; `motion`
-        (6,) is the velocity of the camera. `key` is that of the draws of noise.
+        rad/s, world frame) blur them over an exposure before. `key` is that of the draws of noise, below 2^256.
+
+        Raises Malformed for poses and velocities that no world has, as a changed packet may.
         """
-        own = np.array([[*position, *orientation]])
         speeds = np.zeros((len(poses), 6)) if velocities is None else velocities
-        own_speed = np.zeros((1, 6)) if motion is None else motion.reshape(1, 6)
-        count = SUBFRAMES if optics.exposure > 0.0 and (speeds.any() or own_speed.any()) else 1
+        check_poses(np.array([[*position, *orientation]]), np.zeros((0, 6)))
+        check_poses(poses, speeds)
+        count = SUBFRAMES if optics.exposure > 0.0 and speeds.any() else 1
         lens = lens_of(optics) if any(optics.distortion) else None
         margin = (0, 0) if lens is None else lens.margin
         total = np.zeros((optics.height + 2 * margin[1], optics.width + 2 * margin[0], 3), np.uint16)
-        n, middle = optics.samples, count // 2
-        for number in (*range(middle), *range(middle + 1, count), middle):
-            later_s = (number - middle) * optics.exposure / count
-            eye = advanced(own, own_speed, later_s)[0]
-            view = _view(optics, margin, eye)
-            frame = self._frame(view, optics, numbers, advanced(poses, speeds, later_s))
+        n, view = optics.samples, _view(optics, margin, position, orientation)
+        for earlier in range(1 - count, 1):
+            moved = advanced(poses, speeds, earlier * optics.exposure / count)
+            frame = self._frame(view, optics, numbers, moved)
             for i in range(n * n if n * count > 1 else 0):
                 total += frame.colour[i // n :: n, i % n :: n, :3]
         colour = np.ascontiguousarray(frame.colour[:, :, :3])
@@ -181,13 +179,12 @@ class Drawer:
         return facing_at(clip, model.facing[corners], place[triangles], *_centres(view, pixels))
 
 
-def _view(optics: Optics, margin: tuple[int, int], pose: Floats) -> View:
-    """Return the view of a camera's samples at a pose (7,), with more columns and rows at each side."""
+def _view(optics: Optics, margin: tuple[int, int], position: Vector, orientation: Quaternion) -> View:
+    """Return the view of a camera's samples at a pose, with more columns and rows at each side."""
     n = optics.samples
     width, height = (optics.width + 2 * margin[0]) * n, (optics.height + 2 * margin[1]) * n
-    x, y, z, *orientation = pose.tolist()
     focal = focal_length(optics.fov, optics.width) * n
-    return view_of((x, y, z), tuple(orientation), focal, width, height, optics.near, optics.far)
+    return view_of(position, orientation, focal, width, height, optics.near, optics.far)
 
 
 def _centres(view: View, pixels: Ints) -> tuple[Floats32, Floats32]:

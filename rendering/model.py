@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.common.errors import Malformed
 from foosim.kernels.raster import Floats, Ints, runs
 from foosim.rendering.tessellation import corners_of
 from foosim.world.components.optics import moving_links
@@ -19,6 +20,10 @@ from foosim.world.scene import ORIGIN, UPRIGHT, Colour, Pose, Quaternion, Scene,
 
 SUN: Final[Vector] = (0.384, 0.288, 0.8772684879784524)
 """The direction to the sun, of length 1."""
+FAR: Final = 1e7
+"""The greatest coordinate (m) and velocity (m/s or rad/s): entities that are absent are parked within it."""
+UNIT: Final = 0.01
+"""How far the square of a quaternion's length may be from 1."""
 
 
 class Model:
@@ -166,8 +171,16 @@ class _Building:
         self.vertices, self.count = spans[1], spans[3]
 
 
+def check_poses(poses: Floats, velocities: Floats) -> None:
+    """Raise Malformed where these are no poses (n, 7) and velocities (n, 6)."""
+    x, y, z, w = poses[:, 3:].T
+    near = (np.abs(poses) <= FAR).all() and (np.abs(velocities) <= FAR).all()
+    if not (near and (np.abs(x * x + y * y + z * z + w * w - 1.0) < UNIT).all()):
+        raise Malformed(f"a pose or velocity of a picture has no finite numbers to {FAR:g} and a unit quaternion")
+
+
 def advanced(poses: Floats, velocities: Floats, later_s: float) -> Floats:
-    """Return poses (n, 7) after a short time at velocities (n, 6), in the world frame."""
+    """Return poses (n, 7) after a short time (before, if negative) at velocities (n, 6), in the world frame."""
     if later_s == 0.0:
         return poses
     moved = poses.copy()

@@ -32,10 +32,10 @@ def soup(seed: int) -> tuple[Any, Any, Any]:
     return corners.reshape(-1, 3), triangles, ranges
 
 
-def drawn(draw: Any, parts: tuple[Any, Any, Any], *bands: tuple[int, int], matrix: Any = MATRIX) -> Pictures:
+def drawn(parts: tuple[Any, Any, Any], *bands: tuple[int, int], matrix: Any = MATRIX) -> Pictures:
     nearness, numbers = np.full((HEIGHT, WIDTH), -1e30, np.float32), np.full((HEIGHT, WIDTH), NONE, np.int32)
     for band in bands or [(0, HEIGHT)]:
-        draw(*parts, matrix, NEAR, band, nearness, numbers)
+        raster.raster(*parts, matrix, NEAR, band, nearness, numbers)
     return nearness, numbers
 
 
@@ -48,17 +48,19 @@ def equal(one: Pictures, other: Pictures) -> bool:
 def test_numpy_is_c(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(raster, "PIXELS_AT_ONCE", 1 << 10)
     for matrix in (MATRIX, FROM_ABOVE):
-        one, other = (drawn(draw, soup(seed), matrix=matrix) for draw in (raster.raster, raster.raster_in_numpy))
-        assert equal(one, other)
+        one = drawn(soup(seed), matrix=matrix)
+        with monkeypatch.context() as patched:
+            patched.setattr(raster, "C", None)
+            assert equal(one, drawn(soup(seed), matrix=matrix))
         assert len(np.unique(one[1])) > 1
 
 
 def test_neither_order_nor_bands_change_a_bit() -> None:
     for seed in range(6):
         corners, triangles, ranges = soup(seed)
-        whole = drawn(raster.raster, (corners, triangles, ranges))
+        whole = drawn((corners, triangles, ranges))
         shuffled = np.random.default_rng(seed).permutation(ranges)
-        assert equal(whole, drawn(raster.raster, (corners, triangles, shuffled), (30, HEIGHT), (0, 11), (11, 30)))
+        assert equal(whole, drawn((corners, triangles, shuffled), (30, HEIGHT), (0, 11), (11, 30)))
 
 
 def test_triangles_side_by_side_cover_each_pixel_once() -> None:
@@ -74,18 +76,19 @@ def test_triangles_side_by_side_cover_each_pixel_once() -> None:
             at = [row * 8 + column, row * 8 + column + 1, row * 8 + column + 9, row * 8 + column + 8]
             for triangle in ([at[0], at[1], at[2]], [at[0], at[2], at[3]]):
                 parts = places.reshape(-1, 3), np.array([triangle], np.int32), np.array([[0, 64, 0, 1, 1]], np.int32)
-                count += drawn(raster.raster, parts, matrix=matrix)[1] != NONE
+                count += drawn(parts, matrix=matrix)[1] != NONE
     assert count.max() == 1
     assert count.sum() == 28 * 28
 
 
-def test_a_plane_through_the_camera_s_feet_is_as_far_as_it_is() -> None:
+def test_a_plane_through_the_camera_s_feet_is_as_far_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """A floor of 2 km whose corners are behind the camera and millions of pixels beside the picture."""
     corners = np.array([[-1e3, -1e3, -0.02], [1e3, -1e3, -0.02], [1e3, 1e3, -0.02], [-1e3, 1e3, -0.02]])
     triangles, ranges = np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.array([[0, 4, 0, 2, 0]], np.int32)
-    for draw in (raster.raster, raster.raster_in_numpy):
+    for compiled in (C, None):
+        monkeypatch.setattr(raster, "C", compiled)
         nearness, numbers = np.zeros((HEIGHT, WIDTH), np.float32), np.full((HEIGHT, WIDTH), NONE, np.int32)
-        draw(corners, triangles, ranges, MATRIX, 1e-3, (0, HEIGHT), nearness, numbers)
+        raster.raster(corners, triangles, ranges, MATRIX, 1e-3, (0, HEIGHT), nearness, numbers)
         down = (np.arange(HEIGHT) + 0.5 - 20.5) / 40.0
         below = down > 0.0
         assert (numbers[below] != NONE).all() and (numbers[down < 0.0] == NONE).all()

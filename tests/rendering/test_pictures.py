@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from bench.rendering import TinyRenderer, poses_of
+from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.kernels import raster
 from foosim.rendering.drawer import Drawer, Drawn
@@ -229,19 +230,10 @@ def test_an_exposure_smears_what_moves_by_its_way() -> None:
     ways = [np.nonzero(np.abs(d.colour.astype(int) - d.colour[0, 0]).sum(axis=(0, 2)))[0] for d in drawn]
     longer = np.ptp(ways[1]) - np.ptp(ways[0])
     assert longer == pytest.approx(3.0 * 0.02 * 8 / 9 * focal, abs=2.0)
-    assert ways[1].mean() == pytest.approx(ways[0].mean(), abs=1.0)
+    assert np.abs(ways[1].mean() - ways[0].mean()) == pytest.approx(longer / 2, abs=1.5)
+    assert (ways[1].max() > ways[0].max()) == (rotate(turned, (0.0, 1.0, 0.0))[0] > 0.0)  # it comes from behind
     light = [(d.colour.astype(float) - d.colour[0, 0]).sum() for d in drawn]
-    assert light[1] == pytest.approx(light[0], rel=0.03)
-
-
-def test_a_camera_that_moves_smears_what_stands() -> None:
-    scene = Scene({}, (shape(Box((0.05, 0.05, 0.5)), (2.0, 0.0, 0.0)),))
-    optics = Optics(200, 40, 0.6, 0.05, 5.0, exposure=0.1)
-    drawer = Drawer(scene, NOTHING)
-    still = drawer.draw(optics, (0.0, 0.0, 0.0), UPRIGHT, *NO_LINKS)
-    moving = drawer.draw(optics, (0.0, 0.0, 0.0), UPRIGHT, *NO_LINKS, motion=np.array([0, 1.0, 0, 0, 0, 0]))
-    wide = [np.nonzero((d.colour[20].astype(int) != d.colour[20, 0]).any(axis=1))[0] for d in (still, moving)]
-    assert np.ptp(wide[1]) - np.ptp(wide[0]) == pytest.approx(0.1 * 8 / 9 / 1.95 * 100 / tan(0.3), abs=2.0)
+    assert light[1] == pytest.approx(light[0], rel=0.06)
 
 
 def test_a_shadow_lies_where_the_sun_s_rays_end() -> None:
@@ -299,6 +291,32 @@ def test_a_sheet_is_seen_from_both_sides_and_lit_from_one() -> None:
     lit = [np.median(d.colour[d.segmentation == 1][:, 0]) for d in (above, below)]
     assert lit[0] > 1.5 * lit[1] > 0
     assert (above.segmentation == 1).sum() == pytest.approx((below.segmentation == 1).sum(), rel=0.2)
+
+
+def test_what_is_no_pose_is_refused() -> None:
+    table = Table()
+    drawer, numbers = Drawer(table.scene, table.layout), np.arange(len(table.poses))
+    for place, value in ((0, np.nan), (1, 1e30), (3, np.inf), (6, 3.0)):
+        poses = table.poses.copy()
+        poses[2, place] = value
+        with pytest.raises(Malformed):
+            drawer.draw(OPTICS, (0.0, 0.0, 1.0), DOWN, numbers, poses)
+        with pytest.raises(Malformed):
+            drawer.draw(OPTICS, tuple(poses[2, :3]), tuple(poses[2, 3:]), numbers, table.poses)
+    with pytest.raises(Malformed):
+        drawer.draw(OPTICS, (0.0, 0.0, 1.0), DOWN, numbers, table.poses, np.full((len(numbers), 6), np.nan))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_lens_gives_a_picture(seed: int) -> None:
+    """Where a lens has no inverse nothing is seen."""
+    rng = np.random.default_rng(seed)
+    k1, k2, p1, p2, k3 = rng.uniform(-10.0, 10.0, 5).tolist()
+    optics = Optics(64, 48, float(rng.uniform(0.02, 2.96)), 0.001, 1e4, distortion=(k1, k2, p1, p2, k3))
+    drawn = look(Scene({}, (shape(Box((0.1, 900.0, 900.0)), (2.0, 0.0, 0.0)),)), optics)
+    seen = drawn.segmentation == 1
+    assert np.abs(drawn.depth[seen] - 1.9).max(initial=0.0) < 1e-3
+    assert (drawn.depth[~seen] == 0.0).all()
 
 
 def test_nearer_than_near_and_farther_than_far_nothing_is_seen() -> None:
