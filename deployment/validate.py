@@ -72,7 +72,7 @@ from foosim.world.layout import (
 )
 from foosim.world.matter.materials import RadioMaterial
 from foosim.world.moving.upright import stands_upright
-from foosim.world.placing import MountedAt
+from foosim.world.placing import MountedAt, MountedOrStanding
 from foosim.world.scenery import SceneryMesh
 
 SECTIONS: Final = ("sensors", "actuators", "rules")
@@ -848,9 +848,9 @@ def _selects(settings: ComponentSettings) -> bool:
 
 
 def _mounting(settings: ComponentSettings) -> MountedAt | None:
-    """Return where a component is mounted; None of one without a place on its robot."""
+    """Return where a component is mounted; None of one without a place on its robot, and of one that checks it."""
     where = getattr(settings, "at", None)
-    return where if isinstance(where, MountedAt) else None
+    return where if isinstance(where, MountedAt) and not isinstance(where, MountedOrStanding) else None
 
 
 def _check_mount(where: MountedAt, at: Mounting) -> None:

@@ -31,6 +31,8 @@ MODIFIERS: Final[dict[str, Any]] = {
     "gps": [{"kind": "gaussian_noise", "std": {"horizontal": 1e-5}}],
     "laser_scanner": [],
     "range": [],
+    "depth_camera": [],
+    "segmentation": [],
 }
 OF_ROD: Final[dict[str, Any]] = {
     "imu": {"kind": "imu", "rate": "333 Hz", "at": {"link": "spin", "x": "5 cm"}},
@@ -101,11 +103,14 @@ def mixed() -> str:
     sensors["proximity"] |= {"rays": 8, "range": "4 m"}
     sensors["laser_scanner"] |= {"rays": 19, "range": "4 m", "at": {"z": "80 cm"}}
     sensors["range"] |= {"range": "4 m", "cone": "20 deg", "at": {"z": "80 cm"}}
+    sensors["segmentation"] |= {"at": {"z": "80 cm"}, "look_at": {"entity": "walker"}, "latency": "15 ms"}
     data["hall"] = hall
     data["origin"] = {"latitude": "52.5 deg", "longitude": "13.4 deg"}
     for rod in ("red.goal", "blue.goal"):
         data["robots"][rod]["sensors"] |= OF_ROD
     data["robots"]["camera"]["sensors"]["exact"] = {"kind": "ball_state", "rate": "50 Hz"}
+    eye = {"kind": "camera", "rate": "50 Hz", "at": {"z": "2 m"}, "look_at": {"entity": "ball"}, "exposure": "5 ms"}
+    data["robots"]["camera"]["sensors"]["eye"] = eye
     for rod, (kind, _) in DRIVES.items():
         data["robots"][rod]["actuators"] = {"motors": {"kind": kind}}
         for player in data["players"].values():
@@ -204,6 +209,7 @@ FINGER: Final = """<mujoco model="finger"><worldbody><body name="base">
 
 def robots_of_yard() -> dict[str, Any]:
     """Return robots of all kinds, in places of their own."""
+    seen = {"kind": "rgbd", "rate": "20 Hz", "at": {"z": "1 m", "pitch": "20 deg"}, "fov": "90 deg", "shadows": True}
     scan = {"kind": "laser_scanner", "rate": "10 Hz", "rays": 31, "range": "8 m"}
     arm = {"model": "urdf", "file": "arm.urdf", "fixed": True}
     return {
@@ -231,7 +237,7 @@ def robots_of_yard() -> dict[str, Any]:
             "model": "differential_drive",
             "dynamics": "rigid",
             "at": {"x": "-2 m"},
-            "sensors": {"scan": {**scan, "at": {"x": "20 cm", "z": "15 cm"}}, **OF_SCOUT},
+            "sensors": {"scan": {**scan, "at": {"x": "20 cm", "z": "15 cm"}}, "seen": seen, **OF_SCOUT},
         },
         "finger": {"model": "mjcf", "file": "finger.xml", "fixed": True, "at": {"x": "6 m", "y": "-9 m", "z": "1 m"}},
         "crane-1": crane(-0.35, y=-6.0, reach="5 cm"),

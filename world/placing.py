@@ -43,6 +43,10 @@ class MountedAt(At):
     link: PartName | None = None
 
 
+class MountedOrStanding(MountedAt):
+    """A pose in the frame of a link of the robot, of a robot without a body in the world: its component checks it."""
+
+
 def is_placed(settings: type[SpecBase]) -> bool:
     """Whether settings have the start of an entity: its pose, or its place on the ground and its heading."""
     return "at" in settings.model_fields or {"x", "y", "heading"}.issubset(settings.model_fields)
@@ -50,6 +54,7 @@ def is_placed(settings: type[SpecBase]) -> bool:
 
 ORIGIN_OF_WORLD: Final = At()
 FIRST_LINK: Final = MountedAt()
+FIRST_LINK_OR_WORLD: Final = MountedOrStanding()
 
 
 def leaning(at: At) -> BadValue | None:

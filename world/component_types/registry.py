@@ -124,7 +124,7 @@ def _registering(kind: type[Any], type_name: str, name: str, settings: type[Any]
         found = _described(kind, {"type_name": type_name, "name": name, "factory": made, "settings": settings, **its})
         check_component_type(found)
         key = type_name, name
-        if found.module != _own_modules().get(name):
+        if found.module not in _own_modules().get(name, ()):
             _own(type_name, name)
         first = _known.setdefault(key, found)
         if (first.module, first.factory.__qualname__) != (found.module, made.__qualname__):
@@ -233,15 +233,15 @@ def find_model(kind: str) -> Model:
 
 def names(type_name: str) -> list[str]:
     """Return the names of all installed component types with a type name, sorted."""
-    for module in _own_modules().values():
-        import_module(module)
+    for name in _own_modules():
+        _import_own(name)
     load_entry_points()
     packages = {entry.module.partition(".")[0] for entry in _entry_points()}
     return sorted(
         name
         for (known, name), found in _known.items()
         if known == type_name
-        and (found.module == _own_modules().get(name) or found.module.partition(".")[0] in packages)
+        and (found.module in _own_modules().get(name, ()) or found.module.partition(".")[0] in packages)
     )
 
 
@@ -276,22 +276,25 @@ def _load(entry: EntryPoint) -> str:
 
 def _own(type_name: str, name: str) -> ComponentType | None:
     """Return one of foosim's own, imported from its module; None for an unknown name."""
-    if name in _own_modules():
-        import_module(_own_modules()[name])
+    _import_own(name)
     return _known.get((type_name, name))
 
 
+def _import_own(name: str) -> None:
+    for module in _own_modules().get(name, ()):
+        import_module(module)
+
+
 @cache
-def _own_modules() -> Mapping[str, str]:
-    """Return the modules of foosim's own component types by name."""
+def _own_modules() -> Mapping[str, Sequence[str]]:
+    """Return the modules of foosim's own component types by name: a sensor and a model may have one name."""
     folders = import_module(LIBRARY).__path__
-    kinds = [kind.name for kind in iter_modules(folders) if kind.ispkg]
-    return {
-        module.name: f"{LIBRARY}.{kind}.{module.name}"
-        for kind in kinds
-        for module in iter_modules([f"{folder}/{kind}" for folder in folders])
-        if not module.ispkg
-    }
+    found: dict[str, list[str]] = {}
+    for kind in (kind.name for kind in iter_modules(folders) if kind.ispkg):
+        for module in iter_modules([f"{folder}/{kind}" for folder in folders]):
+            if not module.ispkg:
+                found.setdefault(module.name, []).append(f"{LIBRARY}.{kind}.{module.name}")
+    return found
 
 
 def class_at(path: str, found_on: str = "on PYTHONPATH") -> Any:

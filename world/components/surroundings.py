@@ -89,8 +89,18 @@ class Surroundings:
         return found
 
     def _made_caster(self) -> Caster:
+        return Caster(self.scene, self._layout)
+
+    @property
+    def scene(self) -> Scene:
+        """The bodies of the layout and the scenery, which all components of it share."""
+        found = self._layout.shared("scene", self._spec, self._made_scene)
+        assert isinstance(found, Scene)
+        return found
+
+    def _made_scene(self) -> Scene:
         bodies = {entity.name: body for entity in self._layout.entities if (body := self._body(entity)) is not None}
-        return Caster(Scene(bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes())), self._layout)
+        return Scene(bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
 
     @staticmethod
     def contacts(view: View, entity: Entity) -> Contacts:
