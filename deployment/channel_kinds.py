@@ -10,6 +10,8 @@ from foosim.common.names import CHANNEL_ECHO
 from foosim.deployment.schema import Deployment
 from foosim.world.component_types.payloads import PayloadCodec
 from foosim.world.component_types.per_field import codec_of
+from foosim.world.component_types.registry import class_at
+from foosim.world.component_types.settings import SensorSettings
 
 
 def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> PayloadCodec | None:
@@ -23,10 +25,23 @@ def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> Payloa
     if robot is None or channel == CHANNEL_ECHO:
         return None
     if channel in robot.sensors:
-        return codec_of(robot.sensors[channel].component_type)
+        settings = robot.sensors[channel]
+        its = settings.component_type
+        if not its.drawn_by:
+            return codec_of(its)
+        found = deployment.shared(f"{endpoint}/{channel}", lambda: _drawn(deployment, settings, endpoint, channel))
+        assert isinstance(found, PayloadCodec)
+        return found
     if channel in robot.actuators:
         return codec_of(robot.actuators[channel].component_type)
     raise UnknownName(f"{endpoint} has no such channel", channel, [*robot.sensors, CHANNEL_ECHO, *robot.actuators])
+
+
+def _drawn(deployment: Deployment, settings: SensorSettings, robot: str, channel: str) -> PayloadCodec:
+    """Return the codec of readings that are drawn where they are looked at."""
+    component = settings.component_type
+    drawn_by = class_at(component.drawn_by)(deployment, settings, robot, channel)
+    return PayloadCodec(component.value, component.name, drawn_by)
 
 
 def joints_of(deployment: Deployment, endpoint: str, channel: str) -> tuple[str, ...]:

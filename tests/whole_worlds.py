@@ -31,8 +31,6 @@ MODIFIERS: Final[dict[str, Any]] = {
     "gps": [{"kind": "gaussian_noise", "std": {"horizontal": 1e-5}}],
     "laser_scanner": [],
     "range": [],
-    "depth_camera": [],
-    "segmentation": [],
 }
 OF_ROD: Final[dict[str, Any]] = {
     "imu": {"kind": "imu", "rate": "333 Hz", "at": {"link": "spin", "x": "5 cm"}},
@@ -103,7 +101,6 @@ def mixed() -> str:
     sensors["proximity"] |= {"rays": 8, "range": "4 m"}
     sensors["laser_scanner"] |= {"rays": 19, "range": "4 m", "at": {"z": "80 cm"}}
     sensors["range"] |= {"range": "4 m", "cone": "20 deg", "at": {"z": "80 cm"}}
-    sensors["segmentation"] |= {"at": {"z": "80 cm"}, "look_at": {"entity": "walker"}, "latency": "15 ms"}
     data["hall"] = hall
     data["origin"] = {"latitude": "52.5 deg", "longitude": "13.4 deg"}
     for rod in ("red.goal", "blue.goal"):
@@ -130,6 +127,9 @@ def mixed() -> str:
         data["robots"][robot]["sensors"] = {"velocity": {"kind": "velocity", "rate": "50 Hz"}, "warmth": WARMTH}
     data["robots"]["tug"]["sensors"] |= AROUND
     data["robots"]["omni"]["rules"] = {"own": CELL}
+    depths = {"kind": "depth_camera", "rate": "50 Hz", "at": {"z": "50 cm"}, "focal_length": "25 mm"}
+    things = {"kind": "segmentation", "rate": "30 Hz", "look_at": {"entity": "walker"}, "latency": "15 ms"}
+    data["robots"]["tug"]["sensors"] |= {"depths": depths, "things": things}
     data["robots"]["craft"]["rules"] = {"skin": {"kind": "burns", "after": "100 ms"}}
     data["objects"] = {
         "door": {"model": "door", "closed": {"x": "-6 m", "y": "1 m"}, "height": "50 cm", "open": "50 %"},

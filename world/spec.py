@@ -1,6 +1,6 @@
 """The world part of a deployment: the computed entities, without machines and network."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from functools import cached_property
 from math import gcd
@@ -127,6 +127,7 @@ class WorldSpec(SpecBase):
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     engine: str = Field(default_factory=default_engine)
     _contents: Contents = PrivateAttr(default_factory=Contents)
+    _shared: dict[str, tuple[object, object]] = PrivateAttr(default_factory=dict)
 
     @cached_property
     def engine_type(self) -> Engine:
@@ -162,10 +163,18 @@ class WorldSpec(SpecBase):
         """Return the settings of a robot or an object; None of an entity that a kit brings."""
         return self.robots.get(name) or self.objects.get(name)
 
+    def shared(self, what: str, make: Callable[[], object]) -> object:
+        """Return a value shared by all users of this world, built at its first use."""
+        owner, found = self._shared.get(what, (None, None))
+        if owner is not self:  # a changed copy of a world has what was shared of it
+            found = make()
+            self._shared = {**self._shared, what: (self, found)}
+        return found
+
     def with_contents(self, contents: Contents) -> Self:
         """Return the world with the contents of the files that it names."""
         spec = self.model_copy()
-        spec._contents = contents
+        spec._contents, spec._shared = contents, {}
         return spec
 
     @property

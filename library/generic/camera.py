@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from foosim.world.component_types.registry import sensor
 from foosim.world.components.cameras import ColourSettings, PictureSensor
-from foosim.world.components.sight import Sight
+from foosim.world.components.sight import PICTURES, Sight
 
 
 class CameraSettings(ColourSettings):
@@ -16,6 +16,6 @@ class CameraSettings(ColourSettings):
     bytes_per_pixel: ClassVar = 0.35
 
 
-@sensor("camera", CameraSettings, Sight)
+@sensor("camera", CameraSettings, Sight, drawn_by=PICTURES)
 class Camera(PictureSensor):
     """A colour picture of what is in view."""

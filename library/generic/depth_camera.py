@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from foosim.world.component_types.registry import sensor
 from foosim.world.components.cameras import PictureSensor, PictureSettings
-from foosim.world.components.sight import Sight
+from foosim.world.components.sight import PICTURES, Sight
 
 
 class DepthCameraSettings(PictureSettings):
@@ -16,6 +16,6 @@ class DepthCameraSettings(PictureSettings):
     bytes_per_pixel: ClassVar = 1.0
 
 
-@sensor("depth_camera", DepthCameraSettings, Sight)
+@sensor("depth_camera", DepthCameraSettings, Sight, drawn_by=PICTURES)
 class DepthCamera(PictureSensor):
     """Distances of what is in view."""

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from foosim.world.component_types.registry import sensor
 from foosim.world.components.cameras import ColourSettings, PictureSensor
-from foosim.world.components.sight import Sight
+from foosim.world.components.sight import PICTURES, Sight
 
 
 class RgbdSettings(ColourSettings):
@@ -16,6 +16,6 @@ class RgbdSettings(ColourSettings):
     bytes_per_pixel: ClassVar = 1.35
 
 
-@sensor("rgbd", RgbdSettings, Sight)
+@sensor("rgbd", RgbdSettings, Sight, drawn_by=PICTURES)
 class Rgbd(PictureSensor):
     """A colour picture and distances of what is in view."""

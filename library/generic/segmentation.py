@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from foosim.world.component_types.registry import sensor
 from foosim.world.components.cameras import PictureSensor, PictureSettings
-from foosim.world.components.sight import Sight
+from foosim.world.components.sight import PICTURES, Sight
 
 
 class SegmentationSettings(PictureSettings):
@@ -16,6 +16,6 @@ class SegmentationSettings(PictureSettings):
     bytes_per_pixel: ClassVar = 0.05
 
 
-@sensor("segmentation", SegmentationSettings, Sight)
+@sensor("segmentation", SegmentationSettings, Sight, drawn_by=PICTURES)
 class Segmentation(PictureSensor):
     """Which things are in view, pixel by pixel."""

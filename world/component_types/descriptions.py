@@ -217,7 +217,8 @@ class Component(ComponentType):
     `trigger` is a slot of its own, a field of the robot or `RULE.SLOT` of a rule of it: a sensor also measures at each
     tick at whose start its first number is not 0; or a function that returns it, maybe a slot of an actuator.
     `shown_as` is the Foxglove message that shows a sensor's readings, by its name in `component_types/shown.py`; empty
-    for none.
+    for none. `drawn_by` is a class by `module:Class` that draws its readings where they are looked at, made with world,
+    settings, robot and channel: a decoded reading keeps it as `drawn_by` in its `__dict__`; empty for none.
     `per_field` are the settings with a number for each field (`component_types/per_field.py`), and the least that is
     valid of each; None without a least one.
     """
@@ -228,6 +229,7 @@ class Component(ComponentType):
     array_length: str | ArrayLengthOf = ""
     trigger: str | TriggerOf = ""
     shown_as: str = ""
+    drawn_by: str = ""
     moves: bool = False
     joints: str = ""
     jobs: bool = False

@@ -45,10 +45,11 @@ class Field:
 class PayloadCodec:
     """Encodes and decodes the values of one type."""
 
-    def __init__(self, kind: type[Struct], name: str) -> None:
-        """`name` is that of the component, for messages."""
+    def __init__(self, kind: type[Struct], name: str, drawn_by: Any = None) -> None:
+        """`name` is that of the component, for messages. Decoded values keep `drawn_by` where it is given."""
         self.kind: Final = kind
         self.name: Final = name
+        self.drawn_by: Final = drawn_by
         self.fields: Final = tuple(_field(field) for field in _info(kind).fields)
         self._many = many_of(self.fields)
         self.has_job: Final = self.fields[-1].name == JOB and self.fields[-1].is_number
@@ -136,7 +137,10 @@ class PayloadCodec:
         numbers = struct.unpack(f"<{len(payload) // 8}d", payload)
         if not all(map(isfinite, numbers)):
             raise Malformed(f"{self.name} with non-finite numbers")
-        return self.from_numbers(numbers)
+        value = self.from_numbers(numbers)
+        if self.drawn_by is not None:
+            value.__dict__["drawn_by"] = self.drawn_by
+        return value
 
     def encode(self, value: Any) -> bytes:
         """Return the payload of a value; raises BadValue for an invalid or non-finite number."""
@@ -151,7 +155,8 @@ class PayloadCodec:
         if self._many and not self._least <= more <= self._most:
             last = self.fields[-1].name
             raise BadValue(f"{self.name}.{last} is not {self._least} to {self._most} numbers", more)
-        if not (FLOAT.issuperset(map(type, numbers)) and all(map(isfinite, numbers))):
+        # The sum of finite numbers may be infinite; that of others is never finite.
+        if not (FLOAT.issuperset(map(type, numbers)) and (isfinite(sum(numbers)) or all(map(isfinite, numbers)))):
             for place, number in enumerate(numbers):
                 self._check(field_at(self.fields, len(numbers), place).name, number)
         payload = struct.pack(f"<{len(numbers)}d", *numbers) if self._many else self._packed.pack(*numbers)
@@ -211,6 +216,8 @@ class PayloadCodec:
         if not self._many:
             return values
         count = len(values) - self._many
+        if self._many == 1 and isinstance(values[count], tuple):
+            return [*values[:count], *values[count]]
         for field, several in zip(self.fields[count:], values[count:], strict=True):
             if not isinstance(several, tuple | list) and not _is_array(several):
                 raise BadValue(f"{self.name}.{field.name} is not several numbers", several)

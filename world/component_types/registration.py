@@ -29,7 +29,7 @@ from foosim.world.component_types.shown import MESSAGES
 VALUES: Final[Mapping[str, str]] = {"sensor": "reading", "actuator": "command"}
 """The noun of a component's values."""
 TYPES: Final[Mapping[str, Any]] = {
-    **dict.fromkeys(("kit", "joints"), str),
+    **dict.fromkeys(("kit", "joints", "drawn_by"), str),
     **dict.fromkeys(("needs", "writes", "shared", "tags"), tuple[str, ...]),
     **dict.fromkeys(("actuators", "rules"), dict[str, dict[str, Any]]),
     "each": dict[str, dict[str, int]],

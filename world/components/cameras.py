@@ -18,9 +18,10 @@ from foosim.common.units import Quantity, custom_error
 from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.entities import mounting_of
+from foosim.world.components.in_view import InView
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.optics import Optics
-from foosim.world.components.sight import LINK, LINK_BLURRED, NUMBERS_MAX, InView, Sight, movers_of
+from foosim.world.components.sight import LINK, LINK_BLURRED, NUMBERS_MAX, Sight, looks_of
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.placing import FIRST_LINK, FIRST_LINK_OR_WORLD, Coordinate, MountedOrStanding
@@ -113,9 +114,9 @@ class PictureSettings(SensorSettings):
 
 
 class ColourSettings(PictureSettings):
-    """Each pixel is the mean of `samples` x `samples` points. Links that move blur over the `exposure` before the tick;
-    the camera counts as standing. `gain` is a factor of brightness, `noise` the standard deviation of each value from 0
-    to 255."""
+    """Each pixel is the mean of `samples` x `samples` points. Links that move blur over the `exposure` before the tick,
+    where their state has velocities; the camera counts as standing. `gain` is a factor of brightness, `noise` the
+    standard deviation of each value from 0 to 255."""
 
     samples: Annotated[int, Field(ge=1, le=4)] = 1
     shadows: bool = False
@@ -197,14 +198,15 @@ class PictureSensor(Sensor):
     """A camera: its reading is its pose and those of the moving links in its view."""
 
     def __init__(self, settings: PictureSettings, at: Mounting) -> None:
-        self._eye, self._in_view = Eye(at, settings), InView(settings.optics, movers_of(at))
+        self._eye, self._in_view = Eye(at, settings), InView(settings.optics, looks_of(at))
 
     @staticmethod
     def check(settings: PictureSettings, at: Mounting) -> None:
         """Raise IncompatibleComponent for a pose that cannot be, or for more moving links than a packet takes."""
         Eye(at, settings)
         is_blurred = settings.optics.exposure > 0.0
-        most, count = NUMBERS_MAX // (LINK_BLURRED if is_blurred else LINK), movers_of(at).count
+        most = NUMBERS_MAX // (LINK_BLURRED if is_blurred else LINK)
+        count = sum([number >= 0 for looks in looks_of(at) for number in looks.numbers])
         if count > most:
             less = "fewer of them, or no exposure, would help" if is_blurred else "fewer of them would help"
             what = f"a packet takes {most} moving links, and all {count} of this world may be in view; {less}"
@@ -212,4 +214,5 @@ class PictureSensor(Sensor):
 
     def sample(self, view: View) -> Sight:
         place, turned = self._eye.pose(view.numbers)
-        return Sight(float(view.tick), *place, *turned, tuple(self._in_view.links(view.numbers, place, turned)))
+        numbers = view.numbers if isinstance(view.numbers, list) else list(view.numbers)
+        return Sight(float(view.tick), *place, *turned, tuple(self._in_view.links(numbers, place, turned)))

@@ -6,23 +6,27 @@ those of the moving links in view, as float64, so that a picture drawn from a pa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import sqrt
-from typing import Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from msgspec import Meta, Struct
 
 from foosim.common import limits
-from foosim.common.exact_math import tan
-from foosim.world.component_types.descriptions import ABSENT
+from foosim.common.errors import BadValue
 from foosim.world.component_types.quantities import Count, Metres, QuaternionPart
-from foosim.world.components.optics import Optics, moving_links
+from foosim.world.components.in_view import Looks
+from foosim.world.components.optics import moving_links
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting
-from foosim.world.kinematics import forward_kinematics, twist
-from foosim.world.layout import Entity
-from foosim.world.scene import Body, Link, Quaternion, Vector, conjugate, cross, enclosing, moved, rotate, shape_box
+from foosim.world.layout import Layout
+from foosim.world.scene import Link, Scene, Vector, enclosing, moved, shape_box
 
+if TYPE_CHECKING:  # a client without pictures does without numpy
+    import numpy as np
+    from numpy.typing import NDArray
+
+PICTURES: Final = "foosim.rendering.pictures:Pictures"
+"""What draws the pictures of cameras."""
 LINK: Final = 8
 """Numbers of a link: its number, position and orientation."""
 LINK_BLURRED: Final = 14
@@ -49,40 +53,61 @@ class Sight(Struct, frozen=True, dict=True):
     qw: QuaternionPart
     links: Annotated[tuple[float, ...], Meta(max_length=NUMBERS_MAX)]
 
+    def image(self) -> NDArray[np.uint8]:
+        """Return the picture: (height, width, 3) of red, green, blue. Each is drawn once; all raise as `picture`."""
+        return self.picture("image")
 
-class Drawn(NamedTuple):
-    """A moving link: its number, its index among the links of its body, and the sphere around its looks, in its frame
-    (m)."""
+    def depth(self) -> NDArray[np.float32]:
+        """Return the distances along the axis of the camera (m), (height, width); 0 where nothing is seen."""
+        return self.picture("depth")
 
-    number: int
-    index: int
-    centre: Vector
-    radius: float
+    def segmentation(self) -> NDArray[np.int32]:
+        """Return the number of what is seen, (height, width): number n is `names[n - 1]`, 0 is nothing."""
+        return self.picture("segmentation")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of what a segmentation has: entities and scenery."""
+        found: tuple[str, ...] = self._drawn_by.names
+        return found
+
+    def picture(self, kind: str) -> NDArray[Any]:
+        """Return an `image`, `depth` or `segmentation`.
+
+        Raises BadValue for one that the camera does not have, and of a reading that no player or client received;
+        AssetError where a file of the world is missing, Malformed for a reading that the network has changed.
+        """
+        found: NDArray[Any] = self._drawn_by.picture(kind, self)
+        return found
+
+    @property
+    def _drawn_by(self) -> Any:
+        if "drawn_by" not in self.kept:
+            raise BadValue("pictures are drawn from the samples of players, clients and captures alone", self.tick)
+        return self.kept["drawn_by"]
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """What belongs to the reading and is none of its numbers: `drawn_by`, what draws it, and what was drawn."""
+        return self.__dict__
 
 
-class Movers:
-    """The moving links of one layout that look like something, by bodies."""
-
-    def __init__(self, around: Surroundings, at: Mounting) -> None:
-        bodies: dict[str, list[Drawn]] = {}
-        scene = around.scene
-        for number, (name, index) in enumerate(moving_links(scene)):
-            if sphere := sphere_of(scene.bodies[name].links[index]):
-                bodies.setdefault(name, []).append(Drawn(number, index, *sphere))
-        self.bodies: list[tuple[Entity, Body, int, list[Drawn]]] = [
-            (at.layout[name], scene.bodies[name], at.layout[name].offsets.get(ABSENT, -1), its)
-            for name, its in bodies.items()
-        ]
-        """Each entity with its body, the place of its absence, -1 without one, and its links."""
-        self.count = sum(len(its) for its in bodies.values())
-
-
-def movers_of(at: Mounting) -> Movers:
-    """Return those of a component's layout, which all cameras of it share."""
-    around = Surroundings(at.spec, at.layout)
-    found = at.layout.shared("movers", at.spec, lambda: Movers(around, at))
-    assert isinstance(found, Movers)
+def looks_of(at: Mounting) -> list[Looks]:
+    """Return the bodies with moving links that look like something, which all cameras of a layout share."""
+    scene = Surroundings(at.spec, at.layout).scene
+    found = at.layout.shared("looks", at.spec, lambda: _looks(scene, at.layout))
+    assert isinstance(found, list)
     return found
+
+
+def _looks(scene: Scene, layout: Layout) -> list[Looks]:
+    found: dict[str, Looks] = {}
+    for number, (name, index) in enumerate(moving_links(scene)):
+        body = scene.bodies[name]
+        if sphere := sphere_of(body.links[index]):
+            its = found.setdefault(name, Looks(body, layout[name]))
+            its.numbers[index], (its.middles[index], its.radii[index]) = number, sphere
+    return [*found.values()]
 
 
 def sphere_of(link: Link) -> tuple[Vector, float] | None:
@@ -94,54 +119,5 @@ def sphere_of(link: Link) -> tuple[Vector, float] | None:
     if not shapes:
         return None
     low, high = enclosing([shape_box(shape) for shape in shapes])
-    half = moved(high, low, -1.0)
-    x, y, z = half
-    return moved(low, half, 0.5), 0.5 * sqrt(x * x + y * y + z * z)
-
-
-class InView:
-    """The moving links in the view of one camera."""
-
-    def __init__(self, optics: Optics, movers: Movers) -> None:
-        self._movers, self._exposure, self._far = movers, optics.exposure, optics.far
-        wide = tan(optics.fov / 2.0)
-        high = wide * optics.height / optics.width
-        self._wide, self._high = wide, high
-        self._beside, self._above = sqrt(1.0 + wide * wide), sqrt(1.0 + high * high)
-        self._is_all_around = optics.shadows
-
-    def links(self, numbers: Sequence[float], eye: Vector, orientation: Quaternion) -> list[float]:
-        """Return the numbers of the links that touch the view from a pose (m, world frame), as `Sight.links`.
-
-        With shadows these are all within `far`: what is beside the view throws shadows into it.
-        """
-        found: list[float] = []
-        back = conjugate(orientation)
-        for entity, body, absent_at, drawn in self._movers.bodies:
-            if absent_at >= 0 and numbers[absent_at] != 0.0:
-                continue
-            poses = forward_kinematics(body, entity, numbers)
-            for number, index, centre, radius in drawn:
-                _, position, turned = poses[index]
-                arm = rotate(turned, centre)
-                speeds: tuple[float, ...] = ()
-                if self._exposure:
-                    linear, angular = twist(body, entity, numbers, index)
-                    vx, vy, vz = moved(linear, cross(angular, arm), 1.0)
-                    radius += sqrt(vx * vx + vy * vy + vz * vz) * self._exposure  # noqa: PLW2901
-                    speeds = *linear, *angular
-                x, y, z = rotate(back, moved(moved(position, arm, 1.0), eye, -1.0))
-                if self._touches(x, y, z, radius):
-                    found += (float(number), *position, *turned, *speeds)
-        return found
-
-    def _touches(self, x: float, y: float, z: float, radius: float) -> bool:
-        """Whether a sphere about a place in the frame of the camera (m) touches its view."""
-        if self._is_all_around:
-            reach = self._far + radius
-            return x * x + y * y + z * z <= reach * reach
-        return (
-            -radius <= x <= self._far + radius
-            and abs(y) - x * self._wide <= radius * self._beside
-            and abs(z) - x * self._high <= radius * self._above
-        )
+    x, y, z = moved(high, low, -1.0)
+    return moved(low, (x, y, z), 0.5), 0.5 * sqrt(x * x + y * y + z * z)
