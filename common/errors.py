@@ -10,7 +10,7 @@ from typing import ClassVar, Final, TypeVar
 
 from foosim.common.names import nearest_name
 
-CHOICES_MAX: Final = 24
+CHOICES_MAX: Final = 40
 ABSENT: Final = object()
 """Marks a value that was not given, so that there is none to show."""
 
