@@ -14,7 +14,7 @@ WIDTH, HEIGHT = 67, 41
 NEAR = 0.05
 MATRIX = np.array([[33.5, -40.0, 0, 0], [20.5, 0, -40.0, 0], [1.0, 0, 0, 0], [0, 0, 0, 1.0]])
 """Of a camera at the origin that looks along x."""
-FROM_ABOVE = np.array([[30.0, 0, 0, 30.0], [0, -30.0, 0, 20.0], [0, 0, 0, 1.0], [0, 0, 1.0, 0]])
+PARALLEL = np.array([[0, -10.0, 0, 33.0], [0, 0, -10.0, 20.0], [0, 0, 0, 1.0], [-1.0, 0, 0, 0]])
 
 Pictures = tuple[Any, Any]
 
@@ -23,10 +23,10 @@ def soup(seed: int) -> tuple[Any, Any, Any]:
     """Corners, triangles and ranges of triangles of all sizes: before, behind and around the camera, some alike."""
     rng = np.random.default_rng(seed)
     middles = rng.uniform((-1.0, -3.0, -2.0), (6.0, 3.0, 2.0), (90, 1, 3))
-    corners = middles + rng.normal(size=(90, 3, 3)) * 10.0 ** rng.uniform(-3.0, -0.3, (90, 1, 1))
+    corners = middles + rng.normal(size=(90, 3, 3)) * 10.0 ** rng.uniform(-2.0, 0.0, (90, 1, 1))
     corners[rng.random(90) < 0.03] *= 1e3
-    corners[rng.random(90) < 0.2] = rng.integers(-3, 4, (3, 3))
-    triangles = rng.permuted(np.arange(270)).reshape(90, 3).astype(np.int32)
+    corners[60:] = rng.permutation(corners[:60])[:30]
+    triangles = rng.permutation(np.arange(270, dtype=np.int32).reshape(90, 3))
     ends = np.arange(10, 91, 10)
     ranges = np.stack([0 * ends, 0 * ends + 270, ends - 10, ends, rng.integers(0, 2, 9)], axis=1).astype(np.int32)
     return corners.reshape(-1, 3), triangles, ranges
@@ -47,12 +47,12 @@ def equal(one: Pictures, other: Pictures) -> bool:
 @pytest.mark.parametrize("seed", range(12))
 def test_numpy_is_c(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(raster, "PIXELS_AT_ONCE", 1 << 10)
-    for matrix in (MATRIX, FROM_ABOVE):
+    for matrix in (MATRIX, PARALLEL):
         one = drawn(soup(seed), matrix=matrix)
         with monkeypatch.context() as patched:
             patched.setattr(raster, "C", None)
             assert equal(one, drawn(soup(seed), matrix=matrix))
-        assert len(np.unique(one[1])) > 1
+        assert len(np.unique(one[1])) > 5
 
 
 def test_neither_order_nor_bands_change_a_bit() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from hashlib import blake2b
 from itertools import product
 from math import cos, pi, sin, tan
@@ -37,8 +38,10 @@ from foosim.world.scene import (
     Sphere,
     Vector,
     from_rpy,
+    looks_of,
     rotate,
 )
+from foosim.world.scene import place as placed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 NOTHING: Final = Layout({}, Declared())
@@ -147,6 +150,27 @@ def test_bits_do_not_depend_on_order_memory_process_or_compiler(monkeypatch: pyt
     assert there.stdout.strip() == fresh
     monkeypatch.setattr(raster, "C", None)
     assert pictures_of_table(FRAMES) == fresh
+
+
+def test_what_moves_looks_as_if_it_stood_there() -> None:
+    table = Table()
+    body = table.scene.bodies["red.goal"]
+    link = next(link for link in body.links if any(isinstance(one.geometry, Box) for one in link.shapes))
+    place = (0.1, -0.05, 0.2)
+    drawer = Drawer(Scene({"red.goal": body}, ()), table.layout)
+    number = [index for _, index in moving_links(Scene({"red.goal": body}, ()))].index(body.links.index(link))
+    for turned in (from_rpy(0.3, 1.0, 0.4), from_rpy(0.3, -0.9, 2.4)):
+        there = []
+        for one in looks_of([link])[0][1]:
+            position, orientation = placed(one, place, turned)
+            there.append(replace(one, position=position, orientation=orientation, name="rod"))
+        eye = (0.1, -0.05, 0.4)
+        standing = look(Scene({}, tuple(there)), position=eye, turned=DOWN)
+        poses = np.array([[*place, *turned]])
+        moved = drawer.draw(OPTICS, eye, DOWN, np.array([number]), poses)
+        assert (moved.depth > 0).sum() > 100
+        assert (np.abs(moved.depth - standing.depth) < 1e-5).mean() > 0.999
+        assert (np.abs(moved.colour.astype(int) - standing.colour).max(axis=2) <= 1).mean() > 0.999
 
 
 def test_depth_is_that_of_rays() -> None:
