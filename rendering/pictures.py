@@ -4,29 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from foosim.common.errors import BadValue, Malformed
+from foosim.common.errors import BadValue
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.rendering.drawer import Drawer, Drawn
-from foosim.world.assembly.world import build_scene
+from foosim.rendering.readings import drawn_world
 from foosim.world.components.cameras import PictureSettings
-from foosim.world.components.optics import moving_links
 from foosim.world.components.sight import LINK, LINK_BLURRED, Sight
-from foosim.world.layout import build_layout
-from foosim.world.matter.mesh import AssetError
 from foosim.world.spec import WorldSpec
-
-
-class _Drawing:
-    """What all cameras of a deployment are drawn with."""
-
-    def __init__(self, spec: WorldSpec) -> None:
-        spec.check_robot_files(spec.asset_files)
-        layout = build_layout(spec)
-        scene = build_scene(spec, layout)
-        self.drawer, self.links = Drawer(scene, layout), len(moving_links(scene))
 
 
 class Pictures:
@@ -61,32 +47,24 @@ class Pictures:
     @property
     def names(self) -> tuple[str, ...]:
         """The names of what a segmentation has: number n is `names[n - 1]`, 0 is nothing."""
-        return self._drawing().drawer.things
+        return self._drawer().things
 
-    def _drawing(self) -> _Drawing:
-        found = self._spec.shared("drawing", lambda: _Drawing(self._spec))
-        assert isinstance(found, _Drawing)
+    def _drawer(self) -> Drawer:
+        world = drawn_world(self._spec, self._what)
+        found = self._spec.shared("drawer", lambda: Drawer(world.scene, world.layout))
+        assert isinstance(found, Drawer)
         return found
 
     def _draw(self, sight: Sight) -> Drawn:
-        try:
-            drawing = self._drawing()
-        except (AssetError, Malformed) as error:
-            raise AssetError(f"{self._what} cannot be drawn here without the files of the world: {error}") from error
-        optics, size = self._optics, LINK_BLURRED if self._optics.exposure else LINK
-        if len(sight.links) % size:
-            raise Malformed(f"{self._what}: links of {len(sight.links)} numbers, each has {size}")
-        links = np.array(sight.links).reshape(-1, size)
-        numbers = links[:, 0]
-        if not ((numbers >= 0) & (numbers < drawing.links) & (numbers % 1.0 == 0.0)).all():
-            raise Malformed(f"{self._what}: numbers of links are 0 to {drawing.links - 1}")
+        optics, drawer = self._optics, self._drawer()
+        links = drawn_world(self._spec, self._what).placed(sight, self._what, LINK_BLURRED if optics.exposure else LINK)
         self.draws += 1
-        return drawing.drawer.draw(
+        return drawer.draw(
             optics,
             (sight.x, sight.y, sight.z),
             (sight.qx, sight.qy, sight.qz, sight.qw),
-            numbers.astype(np.intp),
-            links[:, 1:LINK],
-            links[:, LINK:] if optics.exposure else None,
+            links.numbers,
+            links.poses,
+            links.more if optics.exposure else None,
             draw_words(self._key, max(0, int(sight.tick)))[0] if optics.noise else 0,
         )

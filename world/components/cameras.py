@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import copysign, sqrt
-from typing import Annotated, ClassVar, Final, Self
+from typing import Annotated, Any, ClassVar, Final, Self
 
 from pydantic import Field, model_validator
 
@@ -21,7 +21,7 @@ from foosim.world.components.entities import mounting_of
 from foosim.world.components.in_view import InView
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.optics import Optics
-from foosim.world.components.sight import LINK, LINK_BLURRED, NUMBERS_MAX, Sight, looks_of
+from foosim.world.components.sight import LINK, LINK_BLURRED, NUMBERS_MAX, Seen, Sight, looks_of
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.placing import FIRST_LINK, FIRST_LINK_OR_WORLD, Coordinate, MountedOrStanding
@@ -58,7 +58,21 @@ class Distortion(SpecBase):
     k3: Coefficient = 0.0
 
 
-class PictureSettings(SensorSettings):
+class SightSettings(SensorSettings):
+    """The settings of what is drawn where it is looked at, along the x axis of `at`, with z up.
+
+    `at` is in the frame of a link, of a robot without a body in the world's. With `look_at` the sensor turns to a place
+    or an entity that is in the world. A reading leaves `latency` after its tick. `size` is what the network carries: by
+    default that of a usual encoding.
+    """
+
+    latency_ns: Latency = default("0 s", "latency")
+    size_bytes: Size | None = Field(default=None, alias="size")
+    at: MountedOrStanding = FIRST_LINK_OR_WORLD
+    look_at: Target | None = None
+
+
+class PictureSettings(SightSettings):
     """The lens and the pose of a camera, which looks along the x axis of `at`, with z up.
 
     `at` is in the frame of a link, of a robot without a body in the world's. With `look_at` the camera turns to a place
@@ -80,10 +94,6 @@ class PictureSettings(SensorSettings):
     near: Near = default("5 cm")
     far: Far = default("50 m")
     distortion: Distortion = Distortion()
-    latency_ns: Latency = default("0 s", "latency")
-    size_bytes: Size | None = Field(default=None, alias="size")
-    at: MountedOrStanding = FIRST_LINK_OR_WORLD
-    look_at: Target | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -137,7 +147,7 @@ class ColourSettings(PictureSettings):
 class Eye:
     """The pose of a camera. What it keeps follows from deployment and layout."""
 
-    def __init__(self, at: Mounting, settings: PictureSettings) -> None:
+    def __init__(self, at: Mounting, settings: SightSettings) -> None:
         """Raises IncompatibleComponent for a link that the robot does not have, or an unknown entity to look at."""
         where = settings.at
         around = Surroundings(at.spec, at.layout)
@@ -195,13 +205,15 @@ def half_turn(c: float, s: float) -> tuple[float, float]:
 
 
 class PictureSensor(Sensor):
-    """A camera: its reading is its pose and those of the moving links in its view."""
+    """A sensor that is drawn at its readers: its reading is its pose and those of the moving links in its view."""
 
-    def __init__(self, settings: PictureSettings, at: Mounting) -> None:
+    reading: ClassVar[type[Seen]] = Sight
+
+    def __init__(self, settings: Any, at: Mounting) -> None:
         self._eye, self._in_view = Eye(at, settings), InView(settings.optics, looks_of(at))
 
     @staticmethod
-    def check(settings: PictureSettings, at: Mounting) -> None:
+    def check(settings: Any, at: Mounting) -> None:
         """Raise IncompatibleComponent for a pose that cannot be, or for more moving links than a packet takes."""
         Eye(at, settings)
         is_blurred = settings.optics.exposure > 0.0
@@ -212,7 +224,7 @@ class PictureSensor(Sensor):
             what = f"a packet takes {most} moving links, and all {count} of this world may be in view; {less}"
             raise IncompatibleComponent(("kind",), what, settings.kind)
 
-    def sample(self, view: View) -> Sight:
+    def sample(self, view: View) -> Seen:
         place, turned = self._eye.pose(view.numbers)
         numbers = view.numbers if isinstance(view.numbers, list) else list(view.numbers)
-        return Sight(float(view.tick), *place, *turned, tuple(self._in_view.links(numbers, place, turned)))
+        return self.reading(float(view.tick), *place, *turned, tuple(self._in_view.links(numbers, place, turned)))

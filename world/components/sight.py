@@ -35,8 +35,8 @@ NUMBERS_MAX: Final = limits.PAYLOAD_BYTES_MAX // 8 - 8
 """Numbers of links in a packet."""
 
 
-class Sight(Struct, frozen=True, dict=True):
-    """What a camera sees at a tick: the pose of the camera, x ahead, y to the left, z up (m, world frame).
+class Seen(Struct, frozen=True, dict=True):
+    """What is around a sensor at a tick: the pose of the sensor, x ahead, y to the left, z up (m, world frame).
 
     `links` are the moving links in view, each as its number (its place in `optics.moving_links`), the position (m) and
     the orientation (x, y, z, w) of its frame in the world frame, and of a camera with an exposure its linear and
@@ -52,6 +52,21 @@ class Sight(Struct, frozen=True, dict=True):
     qz: QuaternionPart
     qw: QuaternionPart
     links: Annotated[tuple[float, ...], Meta(max_length=NUMBERS_MAX)]
+
+    @property
+    def _drawn_by(self) -> Any:
+        if "drawn_by" not in self.kept:
+            raise BadValue("it is drawn from the samples of players, clients and captures alone", self.tick)
+        return self.kept["drawn_by"]
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """What belongs to the reading and is none of its numbers: `drawn_by`, what draws it, and what was drawn."""
+        return self.__dict__
+
+
+class Sight(Seen, frozen=True, dict=True):
+    """What a camera sees at a tick."""
 
     def image(self) -> NDArray[np.uint8]:
         """Return the picture: (height, width, 3) of red, green, blue. Each is drawn once; all raise as `picture`."""
@@ -79,17 +94,6 @@ class Sight(Struct, frozen=True, dict=True):
         """
         found: NDArray[Any] = self._drawn_by.picture(kind, self)
         return found
-
-    @property
-    def _drawn_by(self) -> Any:
-        if "drawn_by" not in self.kept:
-            raise BadValue("pictures are drawn from the samples of players, clients and captures alone", self.tick)
-        return self.kept["drawn_by"]
-
-    @property
-    def kept(self) -> dict[str, Any]:
-        """What belongs to the reading and is none of its numbers: `drawn_by`, what draws it, and what was drawn."""
-        return self.__dict__
 
 
 def looks_of(at: Mounting) -> list[Looks]:
