@@ -38,7 +38,8 @@ class _Casting:
                         still.append((shape, thing, 0, position, orientation))
                     else:
                         moving.append((shape, thing, number, ORIGIN, UPRIGHT))
-        self._forms, self._moving, self._count = Forms([*still, *moving], Meshes()), slice(len(still), None), len(numbers)
+        self._forms, self._count = Forms([*still, *moving], Meshes()), len(numbers)
+        self._moving = slice(len(still), None)
         self._still = Poses(self._forms, slice(len(still)), np.array([ORIGIN]).T, np.array([UPRIGHT]).T)
         self._near = SortedBoxes(*self._still.boxes())
 
@@ -62,7 +63,8 @@ class Scans:
     def ranges(self, seen: Seen) -> Floats:
         """Return the distances (m), (rows, columns), between the least and the range."""
         its = self._settings
-        return np.clip(self._distances(seen), its.least, its.range).reshape(its.rows, its.columns)
+        found: Floats = np.clip(self._distances(seen), its.least, its.range)
+        return found.reshape(its.rows, its.columns)
 
     def points(self, seen: Seen) -> Floats:
         """Return the places that are met from the least distance on, (n, 3), in the frame of the mount (m)."""

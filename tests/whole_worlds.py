@@ -57,6 +57,7 @@ DRIVEN: Final = {
 AROUND: Final[dict[str, Any]] = {
     "sonar": {"kind": "sonar", "rate": "20 Hz", "range": "4 m", "at": {"z": "30 cm"}},
     "nearby": {"kind": "nearby", "rate": "20 Hz", "range": "8 m", "tag": "vehicle"},
+    "scan": {"kind": "laser_scanner_3d", "rate": "10 Hz", "rows": 4, "columns": 30, "range": "5 m"},
     "map": {"kind": "terrain_map", "rate": "10 Hz", "length": "2 m", "width": "1 m", "resolution": "25 cm"},
 }
 """Sensors of what is around the tug."""

@@ -68,7 +68,7 @@ class LaserScanner3dSettings(SightSettings):
 
     @property
     def optics(self) -> Optics:
-        """Those of a camera that is told of all links within the range, as one with shadows is."""
+        """Those of a camera with shadows: its readings have all links within the range, also those beside its view."""
         return Optics(1, 1, 1.0, self.least, self.range, shadows=True)
 
 
