@@ -63,8 +63,8 @@ class Scans:
     def ranges(self, seen: Seen) -> Floats:
         """Return the distances (m), (rows, columns), between the least and the range."""
         its = self._settings
-        found: Floats = np.clip(self._distances(seen), its.least, its.range)
-        return found.reshape(its.rows, its.columns)
+        found: Floats = np.clip(self._distances(seen), its.least, its.range).reshape(its.rows, its.columns)
+        return found
 
     def points(self, seen: Seen) -> Floats:
         """Return the places that are met from the least distance on, (n, 3), in the frame of the mount (m)."""
