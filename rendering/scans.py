@@ -70,7 +70,8 @@ class Scans:
         """Return the places that are met from the least distance on, (n, 3), in the frame of the mount (m)."""
         distances = self._distances(seen)
         met = np.isfinite(distances) & (distances >= self._settings.least)
-        return self._directions[0, met] * distances[met, None]
+        found: Floats = self._directions[0, met] * distances[met, None]
+        return found
 
     def _distances(self, seen: Seen) -> Floats:
         found: Floats | None = seen.kept.get("drawn")
