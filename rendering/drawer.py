@@ -19,6 +19,8 @@ from foosim.world.scene import Quaternion, Scene, Vector
 
 SUBFRAMES: Final = 9
 """Of an exposure: the last one, at the time of the poses, gives depth and segmentation."""
+PIXELS_AT_ONCE: Final = 1 << 16
+"""Shaded at once, so that their arrays stay in a cache."""
 KEPT_PIXELS: Final = 1 << 22
 KEPT_VIEWS: Final = 32
 """Of what stands, whose pictures are kept for cameras that stand."""
@@ -112,7 +114,9 @@ class Drawer:
         if optics.shadows:
             sun = sun_over(view, self._model.bounds, optics.far)
             shadows = self._drawn(sun, parts)[1].nearness
-            self._shade(view, np.flatnonzero(buffers.numbers != NONE), buffers, (sun, shadows))
+            seen = np.flatnonzero(buffers.numbers != NONE)
+            for start in range(0, len(seen), PIXELS_AT_ONCE):
+                self._shade(view, seen[start : start + PIXELS_AT_ONCE], buffers, (sun, shadows))
         else:
             self._shade(view, np.flatnonzero(buffers.numbers != still.numbers), buffers)
         return buffers
