@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
@@ -11,14 +12,31 @@ from foosim.common.keyed_random import draw_key, draw_words
 from foosim.rendering.drawer import Drawer, Drawn
 from foosim.rendering.readings import drawn_world
 from foosim.world.components.cameras import PictureSettings
+from foosim.world.components.optics import Optics
 from foosim.world.components.sight import LINK, LINK_BLURRED, Sight
 from foosim.world.spec import WorldSpec
+
+
+def drawer_of(spec: WorldSpec, what: str) -> Drawer:
+    """Return what draws a world for all its cameras. Raises AssetError without its files, for `what`."""
+    world = drawn_world(spec, what)
+    found = spec.shared("drawer", lambda: Drawer(world.scene, world.layout))
+    assert isinstance(found, Drawer)
+    return found
+
+
+class PictureSource(NamedTuple):
+    """What is drawn: with which optics, which pictures, and the name of the kind."""
+
+    optics: Optics
+    pictures: Sequence[str]
+    kind: str
 
 
 class Pictures:
     """Draws the readings of one camera, at their first look: the reading keeps what was drawn."""
 
-    def __init__(self, spec: WorldSpec, settings: PictureSettings, robot: str, channel: str) -> None:
+    def __init__(self, spec: WorldSpec, settings: PictureSettings | PictureSource, robot: str, channel: str) -> None:
         self._spec, self._optics, self._kinds = spec, settings.optics, settings.pictures
         self._what = f"{settings.kind} {channel} of {robot}"
         self._key = draw_key(spec.seed, "picture", robot, channel)
@@ -47,16 +65,10 @@ class Pictures:
     @property
     def names(self) -> tuple[str, ...]:
         """The names of what a segmentation has: number n is `names[n - 1]`, 0 is nothing."""
-        return self._drawer().things
-
-    def _drawer(self) -> Drawer:
-        world = drawn_world(self._spec, self._what)
-        found = self._spec.shared("drawer", lambda: Drawer(world.scene, world.layout))
-        assert isinstance(found, Drawer)
-        return found
+        return drawer_of(self._spec, self._what).things
 
     def _draw(self, sight: Sight) -> Drawn:
-        optics, drawer = self._optics, self._drawer()
+        optics, drawer = self._optics, drawer_of(self._spec, self._what)
         links = drawn_world(self._spec, self._what).placed(sight, self._what, LINK_BLURRED if optics.exposure else LINK)
         self.draws += 1
         return drawer.draw(

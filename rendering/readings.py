@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,11 @@ from foosim.world.components.sight import LINK, Seen
 from foosim.world.layout import Layout, build_layout
 from foosim.world.matter.mesh import AssetError
 from foosim.world.scene import Scene
+from foosim.world.scenery import read_contents
 from foosim.world.spec import WorldSpec
+
+FETCHED: Final = "fetched files"
+"""Shared by a world that was read without its files: their contents by path."""
 
 
 class Links(NamedTuple):
@@ -51,7 +55,11 @@ def drawn_world(spec: WorldSpec, what: str) -> DrawnWorld:
 
 
 def _built(spec: WorldSpec, what: str) -> DrawnWorld:
+    fetched = spec.shared(FETCHED, dict)
+    assert isinstance(fetched, dict)
     try:
+        if fetched:
+            spec = spec.with_contents(read_contents(spec.scenery, fetched, spec.robot_files(fetched)))
         spec.check_robot_files(spec.asset_files)
         layout = build_layout(spec)
         scene = build_scene(spec, layout)

@@ -1,0 +1,92 @@
+"""The pictures of a world at its frames: of a sensor that is a camera, and of the whole world from a corner.
+
+One that a frame gives equals one that the packet of its tick gives, without modifiers of the sensor and noise of the
+network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sin
+from typing import Final
+
+from foosim.rendering.pictures import Pictures, PictureSource, drawer_of
+from foosim.world.component_types.payloads import PayloadCodec
+from foosim.world.components.cameras import DEFAULT_FOV, PictureSettings, towards
+from foosim.world.components.entities import mounting_of
+from foosim.world.components.in_view import InView
+from foosim.world.components.optics import Optics
+from foosim.world.components.sight import Sight, looks_of
+from foosim.world.components.view import View
+from foosim.world.layout import Layout
+from foosim.world.scene import Vector, moved
+from foosim.world.spec import WorldSpec
+
+OVERVIEW: Final = "overview"
+FROM: Final[Vector] = (-0.36, -0.48, 0.8)
+"""The direction from the middle of the world to the eye of an overview, of length 1."""
+FAR: Final = 4.0
+"""How far an overview sees, in diameters of the world."""
+
+
+def cameras_of(spec: WorldSpec) -> dict[tuple[str, str], PictureSettings]:
+    """Return the settings of the cameras of a world, by robot and channel, in name order."""
+    return {
+        (robot, channel): settings
+        for robot, its in sorted(spec.robots.items())
+        for channel, settings in sorted(its.sensors.items())
+        if isinstance(settings, PictureSettings)
+    }
+
+
+class Camera:
+    """A camera of a world. `picture` of its readings draws them."""
+
+    def __init__(self, spec: WorldSpec, layout: Layout, robot: str, channel: str) -> None:
+        settings = cameras_of(spec)[robot, channel]
+        self.robot, self.channel, self.settings = robot, channel, settings
+        self.pictures: Final = Pictures(spec, settings, robot, channel)
+        component = settings.component_type
+        self._entity = layout[robot]
+        self._sensor = component.factory(settings, mounting_of(spec, layout, self._entity))
+        self._codec = PayloadCodec(component.value, component.name, self.pictures)
+        self._schedule = spec.schedule(settings)
+
+    def is_due(self, tick: int) -> bool:
+        """Whether the camera takes a picture at a tick."""
+        return self._schedule.is_due(tick)
+
+    def at(self, tick: int, numbers: Sequence[float]) -> Sight | None:
+        """Return the reading at a frame; None while its robot is absent."""
+        if self._entity.is_absent(numbers):
+            return None
+        sight: Sight = self._sensor.sample(View(tick, numbers))
+        sight.kept["drawn_by"] = self.pictures
+        return sight
+
+    def of(self, payload: bytes) -> Sight:
+        """Return the reading in a packet. Raises Malformed."""
+        sight: Sight = self._codec.decode(payload)
+        return sight
+
+
+class Overview:
+    """The whole world, from a corner above it."""
+
+    def __init__(self, spec: WorldSpec, layout: Layout, width: int, height: int) -> None:
+        """Raises AssetError without a mesh of the world."""
+        narrow = DEFAULT_FOV * min(1.0, height / width)
+        middle, radius = drawer_of(spec, OVERVIEW).bounds
+        away = 0.8 * max(radius, 0.1) / sin(narrow / 2.0)
+        self._eye = moved(middle, FROM, away)
+        self._turned = towards(moved((0.0, 0.0, 0.0), FROM, -1.0))
+        optics = Optics(width, height, DEFAULT_FOV, 0.01 * away, FAR * away, samples=2)
+        self.pictures: Final = Pictures(spec, PictureSource(optics, ("image",), OVERVIEW), OVERVIEW, OVERVIEW)
+        self._in_view = InView(optics, looks_of(mounting_of(spec, layout, layout.entities[0])))
+
+    def at(self, tick: int, numbers: Sequence[float]) -> Sight:
+        """Return the reading at a frame."""
+        links = self._in_view.links(list(numbers), self._eye, self._turned)
+        sight = Sight(float(tick), *self._eye, *self._turned, tuple(links))
+        sight.kept["drawn_by"] = self.pictures
+        return sight
