@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import Malformed
 from foosim.kernels.raster import Floats, Ints, runs
-from foosim.rendering.tessellation import corners_of
+from foosim.rendering.tessellation import corners_of, distinct
 from foosim.world.components.optics import moving_links
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
@@ -157,7 +157,7 @@ class _Building:
                 )
             rows.append(corners.T + 0.0)
             colours.append((shape.colour, len(corners.T) // 3))
-        vertices, triangles = np.unique(np.concatenate(rows), axis=0, return_inverse=True)
+        vertices, triangles = distinct(np.concatenate(rows))
         low, high = vertices[:, :3].min(axis=0), vertices[:, :3].max(axis=0)
         middle = (low + high) * 0.5
         x, y, z = (vertices[:, :3] - middle).T
