@@ -101,7 +101,11 @@ class Drawer:
         if lens is not None:
             colour, nearness, triangles = lens.mixed(colour), lens.nearest(nearness, 0), lens.nearest(triangles, NONE)
         depth = np.divide(np.float32(1.0), nearness, out=np.zeros_like(nearness), where=triangles != NONE)
-        return Drawn(sensed(colour, optics.gain, optics.noise, key), depth, self._model.thing[triangles] + np.int32(1))
+        return Drawn(
+            sensed(colour, optics.gain, optics.noise, key),
+            depth,
+            self._model.thing.take(triangles, mode="wrap") + np.int32(1),
+        )
 
     def _light(self, triangles: Ints) -> None:
         """Give triangles the facing and the colours that they have where they are flat."""
@@ -118,9 +122,12 @@ class Drawer:
             shadows = self._drawn(sun, parts)[1].nearness
             seen = np.flatnonzero(buffers.numbers != NONE)
             for start in range(0, len(seen), PIXELS_AT_ONCE):
-                self._shade(view, seen[start : start + PIXELS_AT_ONCE], buffers, (sun, shadows))
-        else:
-            self._shade(view, np.flatnonzero(buffers.numbers != still.numbers), buffers)
+                self._shadow(view, seen[start : start + PIXELS_AT_ONCE], buffers, sun, shadows)
+            return buffers
+        pixels = np.flatnonzero(buffers.numbers != still.numbers)
+        triangles = buffers.numbers.reshape(-1)[pixels]
+        buffers.colour.reshape(-1, 4).view(np.uint32)[pixels] = self._flat.view(np.uint32)[triangles]
+        self._curve(view, pixels[self._model.curved[triangles]], buffers)
         return buffers
 
     def _drawn(self, view: View, parts: Ints) -> tuple[_Buffers, _Buffers]:
@@ -136,11 +143,15 @@ class Drawer:
     def _standing(self, view: View) -> _Buffers:
         """Return the picture of what stands; one from the sun has no colours."""
         shape = view.height, view.width
-        colour = sky(view) if view.rays else np.zeros((0, 4), np.uint8)
-        buffers = _Buffers(np.full(shape, view.start, np.float32), np.full(shape, NONE, np.int32), colour)
+        nearness, numbers = np.full(shape, view.start, np.float32), np.full(shape, NONE, np.int32)
+        buffers = _Buffers(nearness, numbers, np.zeros((0, 4), np.uint8))
         self._raster(view, np.arange(self._model.standing), buffers)
         if view.rays:
-            self._shade(view, np.flatnonzero(buffers.numbers != NONE), buffers)
+            words, empty = self._flat.view(np.uint32).reshape(-1).take(numbers, mode="wrap"), numbers == NONE
+            if empty.any():
+                words = np.where(empty, sky(view), words)
+            buffers = buffers._replace(colour=words.view(np.uint8).reshape(*shape, 4))
+            self._curve(view, np.flatnonzero(self._model.curved.take(numbers, mode="wrap")), buffers)
         return buffers
 
     def _raster(self, view: View, parts: Ints, buffers: _Buffers) -> None:
@@ -150,25 +161,21 @@ class Drawer:
         rows = 0, view.height
         raster(model.world, model.triangles, model.ranges[parts], matrix, view.near, rows, *buffers[:2])
 
-    def _shade(
-        self, view: View, pixels: Ints, buffers: _Buffers, sun: tuple[View, NDArray[np.float32]] | None = None
-    ) -> None:
-        """Colour some pixels by what is at them, under the sun or with the shadows that its picture gives."""
-        model, colour = self._model, buffers.colour.reshape(-1, 4)
+    def _curve(self, view: View, pixels: Ints, buffers: _Buffers) -> None:
+        """Colour pixels of curved triangles."""
         triangles = buffers.numbers.reshape(-1)[pixels]
-        curved = np.flatnonzero(model.curved[triangles])
-        facing = self._facing_of(view, pixels[curved], triangles[curved])
-        if sun is None:
-            colour.view(np.uint32)[pixels] = self._flat.view(np.uint32)[triangles]
-            colour[pixels[curved]] = coloured(model.colours[triangles[curved]], facing)
-            return
-        facings = self._facing[triangles]
-        facings[curved] = facing
-        share = np.zeros(len(pixels), np.float32)
-        lit = np.flatnonzero(facings > 0.0)
+        facing = self._facing_of(view, pixels, triangles)
+        buffers.colour.reshape(-1, 4)[pixels] = coloured(self._model.colours[triangles], facing)
+
+    def _shadow(self, view: View, pixels: Ints, buffers: _Buffers, sun: View, shadows: NDArray[np.float32]) -> None:
+        """Colour pixels with the shadows that a picture from the sun gives, its nearness."""
+        triangles = buffers.numbers.reshape(-1)[pixels]
+        facings, curved = self._facing[triangles], np.flatnonzero(self._model.curved[triangles])
+        facings[curved] = self._facing_of(view, pixels[curved], triangles[curved])
+        share, lit = np.zeros(len(pixels), np.float32), np.flatnonzero(facings > 0.0)
         depth = np.float32(1.0) / buffers.nearness.reshape(-1)[pixels[lit]]
-        share[lit] = hidden(view, *sun, facings[lit], depth, *_centres(view, pixels[lit]))
-        colour[pixels] = coloured(model.colours[triangles], facings, share)
+        share[lit] = hidden(view, sun, shadows, facings[lit], depth, *_centres(view, pixels[lit]))
+        buffers.colour.reshape(-1, 4)[pixels] = coloured(self._model.colours[triangles], facings, share)
 
     def _facing_of(self, view: View, pixels: Ints, triangles: NDArray[np.int32]) -> Floats32:
         """Return how pixels face the sun at which these triangles are seen."""

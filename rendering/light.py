@@ -55,8 +55,8 @@ def facing_at(corners: Floats, facings: Floats, which: Ints, columns: Floats32, 
     return np.clip(-above / np.maximum(below, np.float32(1e-30)), np.float32(-1.0), np.float32(1.0))
 
 
-def sky(view: View) -> Picture:
-    """Return what is seen of a view where nothing is, (height, width, 4)."""
+def sky(view: View) -> NDArray[np.uint32]:
+    """Return what is seen of a view where nothing is, (height, width), each a `Picture`'s four bytes."""
     _, first, across, down = np.array(view.rays).reshape(4, 3)
     columns, rows = np.arange(view.width) + 0.5, np.arange(view.height)[:, np.newaxis] + 0.5
     up = (first[2] + across[2] * columns).astype(np.float32) + (down[2] * rows).astype(np.float32)
@@ -65,8 +65,7 @@ def sky(view: View) -> Picture:
     square = np.float32(view.pixel) * np.float32(view.pixel)
     length = (aside * aside).astype(np.float32) + (below * below).astype(np.float32)
     height = up / np.sqrt(length * square + np.float32(1.0))
-    words = SKY[(height * np.float32(256.0) + np.float32(256.0)).astype(np.int16)]
-    return np.asarray(words.view(np.uint8).reshape(*up.shape, 4))
+    return np.asarray(SKY.take((height * np.float32(256.0) + np.float32(256.0)).astype(np.int16), mode="clip"))
 
 
 def _sky() -> NDArray[np.uint32]:
