@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common.errors import BadValue
@@ -31,6 +32,14 @@ class PictureSource(NamedTuple):
     optics: Optics
     pictures: Sequence[str]
     kind: str
+
+
+class PictureShape(NamedTuple):
+    """The shape and the type of pictures of a kind, and the greatest value of a pixel."""
+
+    shape: tuple[int, ...]
+    form: type[np.generic]
+    most: float
 
 
 class Pictures:
@@ -61,6 +70,16 @@ class Pictures:
             drawn = sight.kept["drawn"] = self._newest[1]
         found: NDArray[Any] = getattr(drawn, "colour" if kind == "image" else kind)
         return found
+
+    def shapes(self) -> dict[str, PictureShape]:
+        """Return the shapes of the camera's pictures, by their kind."""
+        shape = self._optics.height, self._optics.width
+        shapes = {
+            "image": PictureShape((*shape, 3), np.uint8, 255.0),
+            "depth": PictureShape(shape, np.float32, self._optics.far),
+            "segmentation": PictureShape(shape, np.int32, float(np.iinfo(np.int32).max)),
+        }
+        return {kind: shapes[kind] for kind in self._kinds}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -29,6 +29,7 @@ from foosim.deployment.schema import Deployment
 from foosim.library.table.learning.exercises import ENVIRONMENTS, TABLE
 from foosim.simulation.agents import agents_of
 from foosim.simulation.env.episodes import Episodes, Nothing, Reward
+from foosim.simulation.env.looks import READINGS
 from foosim.simulation.simulation import Simulation, read_for_stepping
 
 __all__ = ["TABLE", "FoosimEnv", "FoosimParallelEnv", "Nothing", "Reward", "parallel_env"]
@@ -70,11 +71,20 @@ class _Shown:
         self._episodes, self.render_mode = episodes, render_mode
         return {"render_fps": episodes.rate_hz}
 
+    def _observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of an agent's readings, with pictures of these as well, by their names."""
+        readings = box_of(self._episodes.columns(agent)[0])
+        shapes = self._episodes.looks[agent].shapes
+        if not shapes:
+            return readings
+        pictures = {name: spaces.Box(0, its.most, its.shape, its.form) for name, its in shapes.items()}  # type: ignore[arg-type]
+        return spaces.Dict({READINGS: readings, **pictures})
+
     def _info(self) -> dict[str, Any]:
         return {"tick": self.simulation.tick, "time_s": self.simulation.time_s}
 
 
-class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Vector, Vector]):  # type: ignore[misc]
+class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Any, Vector]):  # type: ignore[misc]
     """Agents of a deployment that act together. All end together: by the reward's class, or cut after the time.
 
     `agents` are the present ones. One whose last robot is removed is terminated; when one is added it comes back, with
@@ -97,9 +107,8 @@ class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Vector, Vector]):  #
         self.metadata = {**self.metadata, **self._begin(Episodes(deployment, **arguments), render_mode)}
         self.possible_agents = list(self._episodes.agents)
         self.agents: list[str] = []
-        of_all = {name: self._episodes.columns(name) for name in self.possible_agents}
-        self.observation_spaces = {name: box_of(columns[0]) for name, columns in of_all.items()}
-        self.action_spaces = {name: box_of(columns[1]) for name, columns in of_all.items()}
+        self.observation_spaces = {name: self._observation_space(name) for name in self.possible_agents}
+        self.action_spaces = {name: box_of(self._episodes.columns(name)[1]) for name in self.possible_agents}
 
     def columns(self, agent: str) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """Return what the numbers of an agent's observations and actions are. Raises UnknownName."""
@@ -107,7 +116,7 @@ class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Vector, Vector]):  #
             raise UnknownName("no agent", agent, self.possible_agents)
         return self._episodes.columns(agent)
 
-    def observation_space(self, agent: str) -> spaces.Box:
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations."""
         return self.observation_spaces[agent]
 
@@ -115,7 +124,7 @@ class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Vector, Vector]):  #
         """Return the space of an agent's actions."""
         return self.action_spaces[agent]
 
-    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Vector], Infos]:
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], Infos]:
         """Begin an episode. The option `start` is what to begin with: a `Frame`, a `Start`, or `CAPTURE@12.5s`."""
         found = self._episodes.reset(seed, options)
         self.agents = self._episodes.present()
@@ -123,7 +132,7 @@ class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Vector, Vector]):  #
 
     def step(
         self, actions: Mapping[str, Vector]
-    ) -> tuple[dict[str, Vector], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+    ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """Take an action of each agent; return observations, rewards, terminations, truncations and infos."""
         if not self._episodes.is_running:
             return {}, {}, {}, {}, {}
@@ -138,7 +147,7 @@ class FoosimParallelEnv(_Shown, pettingzoo.ParallelEnv[str, Vector, Vector]):  #
         return {name: self._info() for name in agents}
 
 
-class FoosimEnv(_Shown, gymnasium.Env[Vector, Vector]):
+class FoosimEnv(_Shown, gymnasium.Env[Any, Vector]):
     """One agent of a deployment. `info` has the tick and the simulated time (`tick`, `time_s`).
 
     `metadata["render_fps"]` of an environment is the rate at which its agent acts.
@@ -165,21 +174,20 @@ class FoosimEnv(_Shown, gymnasium.Env[Vector, Vector]):
         episodes = Episodes(deployment, agents=[agent], **arguments)
         self.metadata = {**self.metadata, **self._begin(episodes, render_mode)}
         (self._agent,) = self._episodes.agents
-        readings, commands = self._episodes.columns(self._agent)
-        self.observation_space: spaces.Box = box_of(readings)  # type: ignore[assignment]
-        self.action_space: spaces.Box = box_of(commands)  # type: ignore[assignment]
+        self.observation_space: spaces.Space[Any] = self._observation_space(self._agent)
+        self.action_space: spaces.Box = box_of(self._episodes.columns(self._agent)[1])  # type: ignore[assignment]
 
     @property
     def columns(self) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
         """What the numbers of observations and actions are."""
         return self._episodes.columns(self._agent)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Vector, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode. The option `start` is what to begin with: a `Frame`, a `Start`, or `CAPTURE@12.5s`."""
         super().reset(seed=seed)
         return self._episodes.reset(seed, options)[self._agent], self._info()
 
-    def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Vector) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take an action; return observation, reward, whether it is over, whether it is cut, and info."""
         found = self._episodes.step({self._agent: action})
         ends = found.is_over, found.is_cut
@@ -215,6 +223,9 @@ def parallel_env(deployment: Deployment | str | Path = TABLE, **arguments: Any) 
     * `readings`, `commands`: globs of `robot/channel` that select among the channels that agents hear and command.
     * `bounds`: least and greatest values of commands by globs of `robot/channel.field`, within the actuators' limits.
     * `ages`: whether the age of each reading (s) is observed, too; -1 before the first.
+    * `pictures`: globs of `robot/channel` that select among the cameras that agents hear, by default none. With some,
+      an observation is a mapping: `readings` are the vector, and each picture is under `robot/channel.image`, `.depth`
+      or `.segmentation`; all zeros before the first.
     * `sets`: changes of the file's values, as `--set` makes them.
     * `pixels`: width and height of what `render` returns (320, 180).
     * `render_mode`: `rgb_array`, or None.

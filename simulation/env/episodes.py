@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from foosim.capture.start_frame import read_branch
 from foosim.client.jobs import Jobs
 from foosim.client.player import Packet
-from foosim.client.vectors import EVERYTHING, Column, CommandVector, ReadingVector, Vector, chosen
+from foosim.client.vectors import EVERYTHING, Column, CommandVector, ReadingVector, chosen
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.common.limits import COUNTER_MAX
 from foosim.deployment.schema import Deployment
 from foosim.painting.overhead import OverheadPainter
 from foosim.simulation.agents import Agent
+from foosim.simulation.env.looks import Looks, Observation
 from foosim.simulation.simulation import Simulation, read_for_stepping
 from foosim.world.frame import Frame
 from foosim.world.start import Start
@@ -76,7 +77,7 @@ class Nothing:
 class Stepped(NamedTuple):
     """What a step led to."""
 
-    observations: dict[str, Vector]
+    observations: dict[str, Observation]
     rewards: dict[str, float]
     is_over: bool
     is_cut: bool
@@ -85,7 +86,8 @@ class Stepped(NamedTuple):
 class Episodes:
     """A deployment as episodes of agents that observe readings and act by commands, at one rate.
 
-    An observation is the vector of an agent's readings, an action that of its commands (`client.vectors`).
+    An observation is the vector of an agent's readings, an action that of its commands (`client.vectors`). With
+    `pictures`, an observation has these beside the vector (`Looks`).
     """
 
     def __init__(  # noqa: PLR0913  # the arguments of both environments, by keyword
@@ -102,6 +104,7 @@ class Episodes:
         commands: Sequence[str] = EVERYTHING,
         bounds: Mapping[str, tuple[float, float]] | None = None,
         ages: bool = False,
+        pictures: Sequence[str] = (),
         sets: Sequence[str] = (),
         pixels: tuple[int, int] = PIXELS,
     ) -> None:
@@ -125,9 +128,11 @@ class Episodes:
         self.agents = tuple(simulation.agents)
         self._steps_max = None if seconds is None else max(1, round(seconds * rate_hz))
         self.vectors: dict[str, tuple[ReadingVector, CommandVector]] = {}
+        self.looks: dict[str, Looks] = {}
         try:
             for name, agent in simulation.agents.items():
                 self.vectors[name] = _vectors(declared, agent, readings, commands, bounds or {}, ages)
+                self.looks[name] = Looks(agent, pictures)
             robots = {
                 name: tuple(dict.fromkeys(column.robot for column in commands.columns))
                 for name, (_, commands) in self.vectors.items()
@@ -182,7 +187,7 @@ class Episodes:
             for _, jobs in self._jobs.values():
                 jobs.hear(readings)
 
-    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> dict[str, Vector]:
+    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> dict[str, Observation]:
         """Begin an episode; return the observations.
 
         A seed begins a row of episodes: the first has the seed itself, further ones follow from it.
@@ -245,12 +250,12 @@ class Episodes:
         self.is_running = not (is_over or is_cut)
         return Stepped(self._observe(), rewards, is_over, is_cut)
 
-    def _observe(self) -> dict[str, Vector]:
+    def _observe(self) -> dict[str, Observation]:
         simulation = self.simulation
         now_ns = simulation.tick * simulation.deployment.tick_ns
         found = {}
         for name, agent in simulation.agents.items():
-            found[name] = self.vectors[name][0].join(agent.newest, now_ns)
+            found[name] = self.looks[name].with_readings(self.vectors[name][0].join(agent.newest, now_ns))
         return found
 
     def present(self) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import copysign, sqrt
+from math import copysign, degrees, radians, sqrt
 from typing import Annotated, Any, ClassVar, Final, Self
 
 from pydantic import Field, model_validator
@@ -27,8 +27,9 @@ from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.placing import FIRST_LINK, FIRST_LINK_OR_WORLD, Coordinate, MountedOrStanding
 from foosim.world.scene import ORIGIN, Quaternion, Vector, moved, multiply, rotate
 
-DEFAULT_FOV: Final = 1.0471975511965976
-"""60 degrees."""
+DEFAULT_FOV: Final = radians(60.0)
+LEAST_DEG: Final = 1.0
+GREATEST_DEG: Final = 170.0
 Fov = Annotated[float, Quantity(units.ANGLE, "1 deg", "170 deg")]
 FocalLength = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "10 m")]
 Near = Annotated[float, Quantity(units.LENGTH, "1 mm", "10 m")]
@@ -58,33 +59,34 @@ class Distortion(SpecBase):
     k3: Coefficient = 0.0
 
 
-class SightSettings(SensorSettings):
-    """The settings of what is drawn where it is looked at, along the x axis of `at`, with z up.
+class EyeSettings(SensorSettings):
+    """The pose of a sensor that looks along the x axis of `at`, with z up.
 
     `at` is in the frame of a link, of a robot without a body in the world's. With `look_at` the sensor turns to a place
-    or an entity that is in the world. A reading leaves `latency` after its tick. `size` is what the network carries: by
-    default that of a usual encoding.
+    or an entity that is in the world.
     """
 
-    latency_ns: Latency = default("0 s", "latency")
-    size_bytes: Size | None = Field(default=None, alias="size")
     at: MountedOrStanding = FIRST_LINK_OR_WORLD
     look_at: Target | None = None
 
 
-class PictureSettings(SightSettings):
-    """The lens and the pose of a camera, which looks along the x axis of `at`, with z up.
+class SightSettings(EyeSettings):
+    """The settings of what is drawn where it is looked at.
 
-    `at` is in the frame of a link, of a robot without a body in the world's. With `look_at` the camera turns to a place
-    or an entity that is in the world. The angle of view is the horizontal `fov`, or follows from the `focal_length` of
-    a lens before a sensor of `sensor_width`; without both it is 60 degrees. Things from `near` to `far` along the axis
-    are seen. A picture leaves `latency` after its tick. `size` is what the network carries: by default that of a usual
-    encoding of such pictures.
+    A reading leaves `latency` after its tick. `size` is what the network carries: by default that of a usual encoding.
     """
 
-    pictures: ClassVar[Sequence[str]] = ()
-    """Those of `image`, `depth` and `segmentation` that its readings have."""
-    bytes_per_pixel: ClassVar[float] = 0.0
+    latency_ns: Latency = default("0 s", "latency")
+    size_bytes: Size | None = Field(default=None, alias="size")
+
+
+class ViewSettings(EyeSettings):
+    """The view of a camera.
+
+    The angle of view is the horizontal `fov`, or follows from the `focal_length` of a lens before a sensor of
+    `sensor_width`; without both it is 60 degrees. The vertical one follows from `width` and `height` of the picture
+    (pixels). Things from `near` to `far` along the axis are seen.
+    """
 
     width: Annotated[int, Field(ge=8, le=1280)] = 320
     height: Annotated[int, Field(ge=8, le=960)] = 180
@@ -93,12 +95,14 @@ class PictureSettings(SightSettings):
     sensor_width: FocalLength = default("32 mm")
     near: Near = default("5 cm")
     far: Far = default("50 m")
-    distortion: Distortion = Distortion()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.fov is not None and self.focal_length is not None:
             raise custom_error(BadValue("both fov and focal_length, which are one angle of view", self.focal_length))
+        if self.focal_length is not None and not LEAST_DEG <= degrees(self.angle) <= GREATEST_DEG:
+            what = f"the angle of view would be {degrees(self.angle):g} deg, not {LEAST_DEG:g} to {GREATEST_DEG:g} deg"
+            raise custom_error(BadValue(what, self.focal_length))
         if self.near >= self.far:
             raise custom_error(BadValue(f"near is not below far, {self.far:g} m", self.near))
         return self
@@ -111,6 +115,21 @@ class PictureSettings(SightSettings):
         return DEFAULT_FOV if self.fov is None else self.fov
 
     @property
+    def optics(self) -> Optics:
+        """What its view depends on beside its pose."""
+        return Optics(self.width, self.height, self.angle, self.near, self.far)
+
+
+class PictureSettings(ViewSettings, SightSettings):
+    """The lens of a camera of pictures."""
+
+    pictures: ClassVar[Sequence[str]] = ()
+    """Those of `image`, `depth` and `segmentation` that its readings have."""
+    bytes_per_pixel: ClassVar[float] = 0.0
+
+    distortion: Distortion = Distortion()
+
+    @property
     def size(self) -> int:
         """The bytes that the network carries for a picture."""
         return round(self.width * self.height * self.bytes_per_pixel) if self.size_bytes is None else self.size_bytes
@@ -119,8 +138,7 @@ class PictureSettings(SightSettings):
     def optics(self) -> Optics:
         """What its pictures depend on beside its pose."""
         lens = self.distortion
-        coefficients = lens.k1, lens.k2, lens.p1, lens.p2, lens.k3
-        return Optics(self.width, self.height, self.angle, self.near, self.far, distortion=coefficients)
+        return replace(super().optics, distortion=(lens.k1, lens.k2, lens.p1, lens.p2, lens.k3))
 
 
 class ColourSettings(PictureSettings):
@@ -147,7 +165,7 @@ class ColourSettings(PictureSettings):
 class Eye:
     """The pose of a camera. What it keeps follows from deployment and layout."""
 
-    def __init__(self, at: Mounting, settings: SightSettings) -> None:
+    def __init__(self, at: Mounting, settings: EyeSettings) -> None:
         """Raises IncompatibleComponent for a link that the robot does not have, or an unknown entity to look at."""
         where = settings.at
         around = Surroundings(at.spec, at.layout)

@@ -15,6 +15,9 @@ from foosim.world.scene import ORIGIN, Body, Quaternion, Vector, conjugate, dot,
 NOTHING: Final = -1
 """The number of a link that stands or looks like nothing."""
 
+DISTORTED: Final = 2.5
+"""A lens with distortion sees up to half a picture more at each side (`rendering.lens`), and a few pixels."""
+
 
 class Looks:
     """A body with moving links that look like something: of each of its links the number, and the sphere around what
@@ -36,7 +39,7 @@ class InView:
         self.bodies = bodies
         self.exposure: float = optics.exposure
         self.far: float = optics.far
-        self.wide: float = tan(optics.fov / 2.0)
+        self.wide: float = tan(optics.fov / 2.0) * (DISTORTED if any(optics.distortion) else 1.0)
         self.high: float = self.wide * optics.height / optics.width
         self.beside: float = sqrt(1.0 + self.wide * self.wide)
         self.above: float = sqrt(1.0 + self.high * self.high)
