@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
 from foosim.common.errors import BadValue, DeploymentError, Malformed
 from foosim.deployment.channel_kinds import channel_codec
@@ -67,7 +68,7 @@ def everything(deployment: Deployment, numbers: list[float], sight: Sight) -> Si
             _, position, orientation = forward_kinematics(scene.bodies[name], layout[name], numbers)[index]
             links += [float(number), *position, *orientation]
     assert set(zip(*[iter(sight.links)] * 8, strict=True)) < set(zip(*[iter(links)] * 8, strict=True))
-    found = Sight(*[getattr(sight, name) for name in sight.__struct_fields__[:-1]], tuple(links))
+    found = structs.replace(sight, links=tuple(links))
     found.kept["drawn_by"] = sight.kept["drawn_by"]
     return found
 
@@ -148,7 +149,7 @@ def test_a_segmentation_has_names_and_kinds_of_pictures_are_those_of_the_camera(
     with pytest.raises(BadValue, match=r"segmentation eye of camera has segmentation\(\) alone, 'image'"):
         sight.image()
     with pytest.raises(BadValue, match="samples of players, clients and captures alone"):
-        Sight(*[0.0] * 7, 1.0, ()).image()
+        Sight(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, ()).image()
 
 
 @pytest.mark.parametrize(
