@@ -131,7 +131,7 @@ def mixed() -> str:
     depths = {"kind": "depth_camera", "rate": "50 Hz", "at": {"z": "50 cm"}, "focal_length": "25 mm"}
     things = {"kind": "segmentation", "rate": "30 Hz", "look_at": {"entity": "walker"}, "latency": "15 ms"}
     kinds = {"kind": "semantic_camera", "rate": "50 Hz", "at": {"z": "50 cm"}, "tag": "vehicle", "hidden": True}
-    data["robots"]["tug"]["sensors"] |= {"depths": depths, "things": things, "kinds": kinds}
+    data["robots"]["omni"]["sensors"] |= {"depths": depths, "things": things, "kinds": kinds}
     data["robots"]["craft"]["rules"] = {"skin": {"kind": "burns", "after": "100 ms"}}
     data["objects"] = {
         "door": {"model": "door", "closed": {"x": "-6 m", "y": "1 m"}, "height": "50 cm", "open": "50 %"},
