@@ -53,12 +53,12 @@ class Lens:
             for a, size in ((x, self._width), (y, height))
         ]
         (column, right), (row, below) = (np.divmod(a, SHARES) for a in place)
-        self._first = row * self._width + column
+        self._first = (row * self._width + column).astype(np.int32)
         self._weights = [
-            (is_seen * a * b).astype(np.uint64) for b in (SHARES - below, below) for a in (SHARES - right, right)
+            (is_seen * a * b).astype(np.uint16) for b in (SHARES - below, below) for a in (SHARES - right, right)
         ]
         self._nearest = np.where(
-            is_seen, self._first + (right >= SHARES // 2) + (below >= SHARES // 2) * self._width, 0
+            is_seen, self._first + (right >= SHARES // 2) + (below >= SHARES // 2) * np.int32(self._width), 0
         )
         self._is_seen, self._shape = is_seen, (optics.height, optics.width)
 
