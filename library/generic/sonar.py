@@ -7,7 +7,7 @@ Siegel, "Physically based simulation model for acoustic sensor robot navigation"
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Final, Self
+from typing import Annotated, Any, ClassVar, Final, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -17,11 +17,12 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, hypot
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.library.generic.range import Distance, directions
+from foosim.library.generic.range import Distance, RangeFinder, directions
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
 from foosim.world.components.base import Sensor
 from foosim.world.components.beams import Beams, BeamsTogether
+from foosim.world.components.rows import Rows
 from foosim.world.components.view import Mounting, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
@@ -60,36 +61,53 @@ class SonarSettings(SensorSettings):
 class Sonar(Sensor):
     """The distance to the nearest echo other than that of the robot's own body; the range without one."""
 
+    rays: ClassVar[Any] = staticmethod(RangeFinder.rays)
+
     def __init__(self, settings: SonarSettings, at: Mounting) -> None:
-        self.range_m, self._dead_zone_m = settings.range, settings.dead_zone
-        self._least_cosine = cos(settings.incidence)
-        ways = [one for way in directions(settings.cone, CIRCLES) for one in _with_two_beside(way)]
-        self._ways, self._beams = np.array(ways), BeamsTogether([Beams(at, settings.at, ways, settings.range)])
+        self.dead_zone_m, self.range_m, self.least_cosine = settings.dead_zone, settings.range, cos(settings.incidence)
+        beams = list(directions(settings.cone, CIRCLES))
+        self.beams = Beams(at, settings.at, beams, settings.range)
+        self.with_beside = Beams(
+            at, settings.at, [one for way in beams for one in _with_two_beside(way)], settings.range
+        )
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and the greatest distance (m); without an echo it is the greatest."""
-        return {"distance": (self._dead_zone_m, self.range_m)}
+        return {"distance": (self.dead_zone_m, self.range_m)}
 
     def sample(self, view: View) -> Distance:
-        distances = self._beams.distances(view)[0]
-        is_met = np.isfinite(distances)
-        x, y, z = (np.where(is_met, distances, 0.0) * self._ways.T).reshape(3, -1, 3)
-        (ax, bx), (ay, by), (az, bz) = ((one[:, 1] - one[:, 0], one[:, 2] - one[:, 0]) for one in (x, y, z))
-        normal = np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
-        (nx, ny, nz), (wx, wy, wz) = normal, self._ways[::3].T
-        facing = np.abs(nx * wx + ny * wy + nz * wz) >= self._least_cosine * np.sqrt(nx * nx + ny * ny + nz * nz)
-        heard = distances[::3]
-        heard = heard[facing & is_met.reshape(-1, 3).all(axis=1) & (heard >= self._dead_zone_m)]
-        return Distance(float(heard.min(initial=self.range_m)))
+        return Distance(float(Sonars([self]).sample(view)[0, 0]))
 
     @staticmethod
-    def rays(sensors: Sequence[Sonar], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each beam: from the mount to the first thing, or as far as the sensor reaches."""
-        found = []
-        for one in sensors:
-            far = np.array([[one.range_m]])
-            found.append(one._beams.ends(numbers, np.zeros_like(far), far)[::3])
-        return np.concatenate(found)
+    def together(sensors: Sequence[Sonar]) -> Sonars:
+        """Return these as one."""
+        return Sonars(sensors)
+
+
+class Sonars(Rows):
+    """Several of them."""
+
+    def __init__(self, sensors: Sequence[Sonar]) -> None:
+        self._beams = BeamsTogether([one.with_beside for one in sensors])
+        self._ways = np.array([one.with_beside.directions for one in sensors])
+        self._dead_zones, self._ranges, self._cosines = np.array(
+            [(one.dead_zone_m, one.range_m, one.least_cosine) for one in sensors]
+        ).T.copy()
+
+    def sample(self, view: View) -> Floats:
+        """Return the distances (m), of shape (sensors, 1)."""
+        distances = self._beams.distances(view)
+        is_met = np.isfinite(distances)
+        threes = (*distances.shape[:1], -1, 3)
+        x, y, z = (np.where(is_met, distances, 0.0) * self._ways.transpose(2, 0, 1)).reshape(3, *threes)
+        (ax, bx), (ay, by), (az, bz) = ((one[..., 1] - one[..., 0], one[..., 2] - one[..., 0]) for one in (x, y, z))
+        nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        wx, wy, wz = self._ways[:, ::3].transpose(2, 0, 1)
+        size = np.sqrt(nx * nx + ny * ny + nz * nz)
+        is_heard = np.abs(nx * wx + ny * wy + nz * wz) >= self._cosines[:, None] * size
+        is_heard &= is_met.reshape(threes).all(axis=2) & (distances[:, ::3] >= self._dead_zones[:, None])
+        found: Floats = np.where(is_heard, distances[:, ::3], self._ranges[:, None]).min(axis=1, keepdims=True)
+        return found
 
 
 def _with_two_beside(way: Vector) -> Iterator[Vector]:

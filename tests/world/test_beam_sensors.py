@@ -147,7 +147,7 @@ def test_rays_to_be_drawn_end_where_readings_say(fleet_text: Text, kind: str) ->
 
 def test_many_sensors_together_have_the_bits_of_each_alone(fleet_text: Text) -> None:
     """With other ranges, cones and mounts among them."""
-    kinds = ("laser_scanner, rays: 40, angle: 300 deg", "range, cone: 20 deg", "range", "proximity, rays: 16")
+    kinds = ("laser_scanner, rays: 40, angle: 300 deg", "range, cone: 20 deg", "range", "proximity, rays: 16", "sonar")
     settings = [
         f"robots.rover0{robot}.sensors.s{number}={{kind: {kind}, rate: 10 Hz, range: {robot + 2} m}}"
         for robot in range(1, 6)
@@ -161,7 +161,7 @@ def test_many_sensors_together_have_the_bits_of_each_alone(fleet_text: Text) -> 
     view = SensingView(0, robot.numbers, np.array(robot.numbers))
     every = [one for rover in robot.layout.of("rover") for one in sensors_of(robot.deployment, robot.layout, rover)]
     met = 0
-    for kind in ("laser_scanner", "range", "proximity"):
+    for kind in ("laser_scanner", "range", "proximity", "sonar"):
         its: list[Any] = [one.sensor for one in every if type(one.sensor).__module__.endswith(f".{kind}")]
         sizes = {len(one.beams.directions) for one in its} if kind != "range" else {0}
         for size in sizes:
