@@ -17,6 +17,7 @@ from foosim.capture.reader import CaptureData, TickMark
 from foosim.capture.rows import CLIENTS, PACKETS, TICK, PacketRow, TickRow
 from foosim.common.errors import BadValue, no_such
 from foosim.common.keyed_random import Slot
+from foosim.deployment.channel_kinds import PLAIN, carried_by
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages import STAGES
@@ -159,6 +160,8 @@ def _seen(evidence: Evidence, row: PacketRow) -> Seen:
     setup = fabric.link(row.source, row.destination, row.channel).setup_at(row.sent_ns)
     what = row.sequence, row.sent_ns, row.stamp_ns, row.payload, row.published, row.copy
     flight = Flight(row.source, row.destination, row.channel, *what)
+    carried = carried_by(evidence.deployment).get((row.source, row.channel), PLAIN)
+    flight.size, flight.latency_ns = row.size, carried.latency_ns
     flight.draw = setup.draws.number(row.sequence, tick, row.count)
     flight.words = setup.words(flight, 0)
     return Seen(row, flight, setup, fabric.timeline, evidence)

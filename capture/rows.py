@@ -117,7 +117,7 @@ class DecidedRow(Row, frozen=True, omit_defaults=True):
     `by_factor_cdbm` is LoRa's interference by spreading factor from 7 on, 0 for none, whatever the fate. With
     `duty_cycle` there is the airtime that was left; with `queue_full` and `queue_codel` how many packets waited, and of
     CoDel for how long waits had been above its target, and which drop in a row it is; with `rx_full` the bytes that its
-    source had left of its share.
+    source had left of its share. With `snr` and `collision` there is the frame of several that was given up, from 1.
     """
 
     collision: Literal["", "contention", "interference", "half_duplex"] = ""
@@ -126,6 +126,7 @@ class DecidedRow(Row, frozen=True, omit_defaults=True):
     queue_packets: Counter = 0
     codel_above_ns: Counter = 0
     codel_drops: Counter = 0
+    frame: Counter = 0
     room_left: Counter = 0
     room_share: Counter = 0
 

@@ -68,6 +68,8 @@ LOOKS_TRIANGLES_MAX: Final = 1_000_000
 SCENERY_TRIANGLES_MAX: Final = 400_000
 """All meshes of a world: they go to a viewer in one message, which fits one chunk of a capture."""
 
+FRAMES_MAX: Final = 4_096
+"""Frames of one packet on a link with an mtu."""
 ROBOT_PACKETS_PER_TICK_MAX: Final = 1 << 16
 """A robot's sequence number is tick x 2^16 + index."""
 OUTBOX_PACKETS_MAX: Final = 64

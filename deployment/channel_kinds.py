@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from foosim.common.errors import UnknownName
 from foosim.common.names import CHANNEL_ECHO
@@ -50,6 +50,27 @@ def joints_of(deployment: Deployment, endpoint: str, channel: str) -> tuple[str,
     robot = deployment.robots.get(endpoint)
     its = None if robot is None else robot.sensors.get(channel) or robot.actuators.get(channel)
     return () if its is None else tuple(its.component_type.joints_named(its) or ())
+
+
+class Carried(NamedTuple):
+    """What the network carries in place of a sensor's payload: its size (bytes), and how much later it arrives."""
+
+    size: int | None
+    latency_ns: int
+
+
+PLAIN: Final = Carried(None, 0)
+"""Of a channel whose packets are as long as their payload, without a latency."""
+
+
+def carried_by(deployment: Deployment) -> dict[tuple[str, str], Carried]:
+    """Return what the network carries of robots' sensors, by robot and channel, without the PLAIN ones."""
+    found = {
+        (robot, channel): Carried(settings.carried_bytes, settings.late_by_ns)
+        for robot, spec in deployment.robots.items()
+        for channel, settings in spec.sensors.items()
+    }
+    return {pair: carried for pair, carried in found.items() if carried != PLAIN}
 
 
 class Channel(NamedTuple):

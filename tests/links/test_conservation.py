@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foosim.common.limits import FRAMES_MAX
 from foosim.vhub.network.packet import Flight
 from tests.links.offered import MS, every, fabric_of, fates
 from tests.links.proof import Proof
@@ -30,7 +31,7 @@ def test_with_everything_off_nothing_is_dropped_or_delayed(offers: list[tuple[in
 # --- the first gate --------------------------------------------------------------------------------------------------
 
 GATES: Final[tuple[tuple[str, str], ...]] = (
-    ("too_big", "mtu: 10 B"),
+    ("too_big", "mtu: 1 B"),
     ("filtered", "allow: false"),
     ("queue_full", "rate: 1 bit/s, queue: {bytes: 1 B}"),
     ("random_loss", "loss: 100 %"),
@@ -50,11 +51,13 @@ def test_an_earlier_gate_beats_a_later_one(proof: Proof) -> None:
                                      + [written for _, written in gates if written]))  # fmt: skip
         link = fabric.link("a", "b", "data")
         flight = Flight("a", "b", "data", 1, 0, 0, bytes(100))
+        flight.size = FRAMES_MAX + 1
         if link.send(flight):
             link.arrive(flight, "rx_down" if gates[-1][0] == "rx_down" else "")
         wrong += flight.cause != gates[0][0]
     proof.exact("T24", "combinations of gates in which not the first names the cause", wrong, 0, 2 ** len(GATES) - 1)
-    assert [flight.cause for flight in fates(fabric_of("mtu: 40 B"), [0, 1], [40, 41])] == ["", "too_big"]
+    sizes = [FRAMES_MAX, FRAMES_MAX + 1]
+    assert [flight.cause for flight in fates(fabric_of("mtu: 1 B"), [0, 1], sizes)] == ["", "too_big"]
 
 
 def test_what_is_dropped_early_leaves_later_stages_as_they_were() -> None:

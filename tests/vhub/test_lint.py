@@ -212,22 +212,22 @@ def test_who_offers_more_than_is_carried_is_warned_of() -> None:
 
 
 @pytest.mark.parametrize("limit", [16, 1023, 1024])
-def test_packets_that_are_longer_than_an_mtu_are_named(limit: int) -> None:
+def test_packets_that_do_not_fit_into_a_queue_are_named(limit: int) -> None:
     """A distance of each of 128 rays is 8 bytes; a rover hears speeds of its two wheels, or a way, in 16."""
     path = TABLE.with_name("warehouse.yaml")
     text = expanded_text(path.read_text(), path.name)
-    links = f"network.links=[{{id: thin, from: '*', to: '*', mtu: {limit} B}}]"
+    links = f"network.links=[{{id: thin, from: 'rover*', to: 'pilot*', rate: 1 Mbit/s, queue: {{bytes: {limit} B}}}}]"
     made = load_deployment(apply_sets(text, path.name, ["robots.rover01.sensors.proximity.rays=128", links]), path.name)
-    (warning,) = warnings_of(made) or [""]
+    warning, *_ = warnings_of(made) or [""]
     assert ("rover01 proximity (1024 B)" in warning) == (limit < 1024)
     assert ("rover02 proximity (128 B)" in warning) == (limit < 128) and " drive (" not in warning
     assert warning in "\n".join(start_lines(summaries(made), "some.yaml"))
 
 
-def test_commands_of_a_fixed_or_a_jointed_size_that_are_longer_than_an_mtu_are_named() -> None:
+def test_commands_of_a_fixed_or_a_jointed_size_that_do_not_fit_into_a_queue_are_named() -> None:
     """Four rotors have 32 B, an arm of seven joints 56 B."""
     path = TABLE.with_name("yard.yaml")
-    links = "network.links=[{id: thin, from: '*', to: '*', mtu: 31 B}]"
+    links = "network.links=[{id: thin, from: '*', to: '*', rate: 1 Mbit/s, queue: {bytes: 31 B}}]"
     made = read_for_stepping(path, [links])
     (text,) = warnings_of(made)
     assert "arm joints (56 B)" in text and "eagle rotors (32 B)" in text

@@ -225,9 +225,9 @@ def distinct_flight() -> Flight:
 
 def test_a_packet_begins_as_its_state_does_and_comes_back_whole() -> None:
     addressed = Flight("camera", "controller", "ball", 1, 2, 3, b"payload")
-    assert state_of(addressed) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", draw=1)
+    assert state_of(addressed) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", draw=1, size=7)
     copied = Flight("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1)
-    assert state_of(copied) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1, draw=1)
+    assert state_of(copied) == FlightState("camera", "controller", "ball", 1, 2, 3, b"payload", True, 1, draw=1, size=7)
     state = state_of(distinct_flight())
     assert state_of(flight_of(state)) == state
 
@@ -243,7 +243,6 @@ def test_a_row_has_each_column_of_its_packet_in_its_place() -> None:
         "fate": "delivered",
         "loss_word": flight.words[Slot.LOSS].to_bytes(8).hex(),
         "jitter_word": flight.words[Slot.JITTER].to_bytes(8).hex(),
-        "size": len(flight.payload),
         "wall_released_ns": flight.released_wall_ns,
         "interference_cdbm": level_cdbm(flight.interference),
         "error_ppm": flight.error_threshold * 1_000_000 >> 64,

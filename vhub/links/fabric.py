@@ -171,7 +171,7 @@ class Link:
         if is_offered:
             self.state.offered += 1
         flight.rule, flight.radio = self.profile.rule, self.profile.radio
-        flight.due_ns = sent_ns
+        flight.due_ns = sent_ns + flight.latency_ns
         flight.phase_ns = now.phase_ns
         if now.slots:
             flight.slots = now.slots

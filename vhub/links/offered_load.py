@@ -7,11 +7,16 @@ the players that hear them, at an undeclared rate. Pure: used by `lint`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 
+from foosim.common.limits import FRAMES_MAX
 from foosim.deployment.network.link_settings import Profile, Profiles
 from foosim.deployment.schema import Deployment
+from foosim.vhub.network.packet import frames_of
+from foosim.vhub.stages.admission import longest_of
 from foosim.world.component_types.per_field import payload_bytes
+from foosim.world.component_types.settings import SensorSettings
 
 Key = tuple[str, str]
 """Settings that links share: the rule and the radio."""
@@ -28,6 +33,8 @@ class Flow:
     channel: str
     rate_hz: float
     """As declared, 0 where it is not."""
+    frames: int = 1
+    """In how many frames each of them travels at most, where its size is known."""
 
     @property
     def key(self) -> Key:
@@ -51,7 +58,9 @@ def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
             robot = deployment.robots.get(source)
             sensor = None if robot is None else robot.sensors.get(channel)
             rate_hz = 0.0 if sensor is None else float(sensor.rate_hz)
-            yield Flow(profiles.find(source, player, channel), source, player, channel, rate_hz)
+            flow = Flow(profiles.find(source, player, channel), source, player, channel, rate_hz)
+            size = max([size for _, size in _sizes(deployment, flow)], default=0)
+            yield replace(flow, frames=len(frames_of(size, flow.profile.settings.payload_max)))
         for name in spec.robots:
             if deployment.robots[name].actuators:
                 yield Flow(profiles.find(player, name, ""), player, name, "", float(spec.rate_hz))
@@ -66,7 +75,7 @@ def used_links(flows: Iterable[Flow]) -> dict[Key, set[Pair]]:
 
 
 def offered_hz(flows: Iterable[Flow]) -> dict[Key, float]:
-    """Return the packets per second on an air, or without one of the busiest queue, by settings."""
+    """Return the frames per second on an air, or without one of the busiest queue, by settings."""
     once = {
         (flow.key, flow.queue, "" if flow.is_once_for_all else flow.destination, flow.channel): flow for flow in flows
     }
@@ -74,28 +83,33 @@ def offered_hz(flows: Iterable[Flow]) -> dict[Key, float]:
     on_air: dict[Key, bool] = {}
     for flow in once.values():
         of_key = queues.setdefault(flow.key, {})
-        of_key[flow.queue] = of_key.get(flow.queue, 0.0) + flow.rate_hz
+        of_key[flow.queue] = of_key.get(flow.queue, 0.0) + flow.rate_hz * flow.frames
         on_air[flow.key] = flow.profile.settings.is_on_air
     return {key: sum(rates.values()) if on_air[key] else max(rates.values()) for key, rates in queues.items()}
 
 
 def long_packets(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str]:
-    """Return a warning of the channels whose packets are longer than an mtu, by settings of links."""
+    """Return a warning of the channels whose packets a link never carries, by settings of links."""
     found: dict[Key, dict[str, int]] = {}
-    limits: dict[Key, int] = {}
+    limits: dict[Key, str] = {}
     for flow in flows:
-        limit = flow.profile.settings.payload_max
-        if limit is None:
-            continue
-        limits[flow.key] = limit
+        settings = flow.profile.settings
+        has_queue = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
+        in_queue, in_frames = settings.queue.bytes_max if has_queue else inf, longest_of(settings) or inf
+        limit = min(in_queue, in_frames)
+        limits[flow.key] = (
+            f"the queue of {in_queue} B"
+            if in_queue <= in_frames
+            else f"{FRAMES_MAX} frames of {settings.payload_max} B"
+        )
         for channel, size in _sizes(deployment, flow):
             if size > limit:
                 found.setdefault(flow.key, {})[channel] = size
     texts = {}
     for key, channels in found.items():
         named = ", ".join(f"{channel} ({size} B)" for channel, size in sorted(channels.items()))
-        what = f"all packets longer than the mtu of {limits[key]} B are dropped: {named}"
-        texts[key] = f"{what}; fewer numbers or a greater mtu help"
+        what = f"all packets that do not fit into {limits[key]} are dropped: {named}"
+        texts[key] = f"{what}; fewer numbers, a smaller picture or a greater limit help"
     return texts
 
 
@@ -117,6 +131,8 @@ def _sizes(deployment: Deployment, flow: Flow) -> Iterator[tuple[str, int]]:
     for channel, settings in sorted((robot.actuators if is_command else robot.sensors).items()):
         if is_command or channel == flow.channel:
             counts = robot.component_type.fields_of(robot, deployment)
-            size = payload_bytes(settings.component_type, settings, counts)
+            size = settings.carried_bytes if isinstance(settings, SensorSettings) else None
+            if size is None:
+                size = payload_bytes(settings.component_type, settings, counts)
             if size is not None:
                 yield f"{name} {channel}", size

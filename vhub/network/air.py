@@ -25,8 +25,8 @@ DEAF: Final = 2**62
 sums of cut numbers do not depend on their order either, and a state has 64 bits for them."""
 NOTHING_CDBM: Final = -(10**6)
 NEVER_NS: Final = 2**62
-Key = tuple[str, int, int]
-"""Source, sequence and copy of a packet: of a broadcast one for all its receivers."""
+Key = tuple[str, int, int, int]
+"""Source, sequence, copy and frame of a packet: of a broadcast one for all its receivers."""
 
 
 class _Heard:
@@ -130,7 +130,7 @@ class Air:
             if until_ns > ready_ns:
                 contending.add(other)
             if is_open:
-                turns.append(open_turns[other, known.sequence, known.copy])
+                turns.append(open_turns[other, known.sequence, known.copy, known.frame])
             elif until_ns > free_ns:
                 free_ns = until_ns
         if waiting > 1:
@@ -166,7 +166,7 @@ class Air:
                 self._next_ns = turn_ns
         for turn in begun:
             known = turn.known
-            del self._open[known.source, known.sequence, known.copy]
+            del self._open[known.source, known.sequence, known.copy, known.frame]
             known.turn_ns, known.radio, known.hears = -1, "", []
             self._spoil_others(known)
             for flight, of, _ in turn.packets:
@@ -183,12 +183,14 @@ class Air:
             self._add_open(known)
 
     def _turn_of(self, flight: Flight) -> Turn | None:
-        """Return a packet's turn if it has not begun."""
-        return self._open.get((flight.source, flight.sequence, flight.copy))
+        """Return a packet's turn, of its last frame, if it has not begun."""
+        return self._open.get((flight.source, flight.sequence, flight.copy, max(0, flight.frames - 1)))
 
     def _add_open(self, known: Transmission) -> None:
         """Add a transmission that is still to begin."""
-        self._open[known.source, known.sequence, known.copy] = Turn(known, self._senders[known.source, known.radio])
+        self._open[known.source, known.sequence, known.copy, known.frame] = Turn(
+            known, self._senders[known.source, known.radio]
+        )
         self._next_ns = min(self._next_ns, known.turn_ns)
 
     def _spoil_others(self, known: Transmission) -> None:

@@ -100,6 +100,8 @@ class Transmission(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     radio: str = ""
     hears: list[str] = []
     """Where it can be deferred: its sender's radio, and the stations in range whose turns can be deferred, too."""
+    frame: int = 0
+    """Of a packet in several frames that each take a turn: which one it is, from 0."""
 
 
 class AirState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
@@ -192,6 +194,12 @@ class FlightState(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """The result of medium and channel at sending; empty when it got through."""
     decided_by: Numbers = ()
     """Further numbers that decided its drop."""
+    size: int = 0
+    """Its bytes for the network: those of the payload, unless its sensor declares others."""
+    frames: int = 0
+    """How many frames of it take a turn on the air, where these are several."""
+    latency_ns: int = 0
+    """The latency of its sensor, after the network's delay."""
 
 
 Counts = dict[int, int]

@@ -43,6 +43,7 @@ class Flight:
         self.source, self.destination, self.channel = source, destination, channel
         self.sequence, self.sent_ns, self.stamp_ns, self.payload = sequence, sent_ns, stamp_ns, payload
         self.published, self.copy = published, copy
+        self.size = len(payload)
         self.draw = sequence
         self.count = self.due_ns = self.slots = self.released_wall_ns = 0
         self.arrival_tick = -1
@@ -51,7 +52,7 @@ class Flight:
         self.mangled = b""
         self.phase_ns = self.queue_bytes = self.queue_ns = self.access_ns = self.airtime_ns = 0
         self.propagation_ns = self.jitter_ns = self.held_ns = self.model_ns = self.bits_flipped = 0
-        self.put_off_ns = 0
+        self.put_off_ns = self.latency_ns = self.frames = 0
         self.is_bad = self.is_doubled = self.is_settled = False
         self.walls: tuple[str, ...] = ()
         self.by_factor: tuple[int, ...] = ()
@@ -90,6 +91,14 @@ def size_of(flight: Flight) -> int:
 def size_of_payload(size: int) -> int:
     """Return the greatest size in a message of a packet with a payload of `size` bytes."""
     return PACKET_HEAD_BYTES_MAX + size
+
+
+def frames_of(size: int, mtu: int | None) -> tuple[int, ...]:
+    """Return the sizes of the frames in which a packet of `size` bytes travels over a link with an mtu (bytes)."""
+    if mtu is None or size <= mtu:
+        return (size,)
+    whole, rest = divmod(size, mtu)
+    return (mtu,) * whole + ((rest,) if rest else ())
 
 
 def level_cdbm(power: int) -> int:

@@ -57,9 +57,11 @@ class Turn:
                 if by_ns:
                     flight.air_start_ns += by_ns
                     flight.air_end_ns += by_ns
-                    flight.access_ns += by_ns - ready_by_ns
-                    if ready_by_ns:
-                        flight.queue_ns += ready_by_ns
+                    # What waits for an earlier frame of its own packet is not in a queue.
+                    waits_ns = 0 if flight.frames else ready_by_ns
+                    flight.access_ns += by_ns - waits_ns
+                    if waits_ns:
+                        flight.queue_ns += waits_ns
                 put_off(flight, by_ns, last_ns)
 
 
@@ -94,7 +96,7 @@ class Contest:
             at_ns = known.until_ns
         return at_ns + backoff_ns
 
-    def put_off(self, turn_ns: int, busy_ns: int, slot_ns: int, of_all: dict[tuple[str, int, int], Turn]) -> None:
+    def put_off(self, turn_ns: int, busy_ns: int, slot_ns: int, of_all: dict[tuple[str, int, int, int], Turn]) -> None:
         """Defer the turns after one of the station that takes `busy_ns`; `of_all` are all turns that are to come.
 
         They are frozen meanwhile, less the slot of their own countdown that it takes, and less the time for which a

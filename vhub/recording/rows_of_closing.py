@@ -42,7 +42,7 @@ from foosim.vhub.network.air import DEAF
 from foosim.vhub.network.memory import Age
 from foosim.vhub.network.packet import DELIVERED, DROPPED, IN_FLIGHT, Flight, level_cdbm
 from foosim.vhub.stages.duty import DUTY_CYCLE
-from foosim.vhub.stages.medium import COLLISION
+from foosim.vhub.stages.medium import COLLISION, SNR
 from foosim.vhub.stages.queue import CODEL, QUEUE_FULL
 from foosim.vhub.stages.receiver import RECEIVER_FULL
 from foosim.vhub.state.records import Closing
@@ -116,10 +116,12 @@ def packet_entry(flight: Flight) -> Entry:
 
 
 DECIDING: Final[dict[str, tuple[str, ...]]] = {
+    COLLISION: ("frame",),
     DUTY_CYCLE: ("duty_left_ns",),
     QUEUE_FULL: ("queue_packets",),
     CODEL: ("queue_packets", "codel_above_ns", "codel_drops"),
     RECEIVER_FULL: ("room_left", "room_share"),
+    SNR: ("frame",),
 }
 """By cause of a drop, the fields of a row for what `Flight.decided_by` has."""
 _FATES: Final[dict[str, Fate]] = {"": DELIVERED, IN_FLIGHT: IN_FLIGHT}
@@ -149,7 +151,7 @@ def packet_row(flight: Flight) -> PacketRow:
         flight.rule,
         words[_LOSS].to_bytes(8).hex() if slots >> _LOSS & 1 else "",
         words[_JITTER].to_bytes(8).hex() if slots >> _JITTER & 1 and on_its_way else "",
-        len(payload),
+        flight.size,
         payload,
         flight.released_wall_ns,
         radio,

@@ -1,4 +1,4 @@
-"""Admission: drops packets that are too long for the link, and those of a sender that is out of service.
+"""Admission: drops packets of too many frames for the link, and those of a sender that is out of service.
 
 By radio or by wire: endpoints on board of a body that is out of service have no power. Links are made anew when a body
 goes out of service (`Fabric.turn_to`), so that the others need not check.
@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from foosim.common.limits import FRAMES_MAX
+from foosim.deployment.network.radios import Radio
 from foosim.vhub.network.link_context import LinkSetup
-from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.packet import Flight, frames_of
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
 
@@ -18,11 +20,16 @@ NODE_DOWN: Final = "node_down"
 NO_ROUTE: Final = "no_route"
 
 
+def longest_of(settings: Radio) -> int | None:
+    """Return the greatest size of a packet (bytes) that a link carries; None without a limit."""
+    return None if settings.payload_max is None else settings.payload_max * FRAMES_MAX
+
+
 class Admission(Stage):
-    """Compares payloads with the longest one, and checks the sender's body in the newest frame."""
+    """Compares sizes with that of FRAMES_MAX frames, and checks the sender's body in the newest frame."""
 
     def __init__(self, setup: LinkSetup) -> None:
-        self._longest = setup.settings.payload_max
+        self._longest = longest_of(setup.settings)
         self._is_down = setup.world.is_down(setup.source)
 
     @classmethod
@@ -32,14 +39,19 @@ class Admission(Stage):
         return cls(setup) if setup.settings.payload_max is not None or setup.world.is_down(setup.source) else None
 
     def at_sending(self, flight: Flight) -> str:
-        if self._longest is not None and len(flight.payload) > self._longest:
+        if self._longest is not None and flight.size > self._longest:
             return TOO_BIG
         return NODE_DOWN if self._is_down else ""
 
     def explain(self, seen: Seen, note: Explanation) -> None:
-        row, limit = seen.row, "any size" if self._longest is None else f"at most {self._longest} B"
+        row, mtu = seen.row, seen.settings.payload_max
+        limit = "any size" if self._longest is None else f"at most {self._longest} B"
         state = seen.out_of_service(row.source) if row.cause == NODE_DOWN else "in service"
-        note.add("{size} B of {}, sender {sender}", limit, size=row.size, mtu=self._longest, sender=state)
+        note.add("{size} B of {}, sender {sender}", limit, size=row.size, mtu=mtu, sender=state)
+        frames = frames_of(row.size, mtu)
+        note.facts["frames"] = len(frames)
+        if len(frames) > 1 and row.cause != TOO_BIG:
+            note.text += f", {len(frames)} frames of {mtu} B, the last of {frames[-1]} B"
 
 
 class NoRoute(Admission):

@@ -48,7 +48,7 @@ class Corruption(Stage):
         return cls(setup) if errors or settings.duplicate > 0.0 else None
 
     def at_sending(self, flight: Flight) -> str:
-        words, bits = flight.words, 8 * len(flight.payload)
+        words, bits = flight.words, 8 * flight.size
         if self._error_rate and bits and words[Slot.CORRUPT] < error_threshold(self._error_rate, bits):
             if not self._delivers:
                 return CRC_FAIL
@@ -75,7 +75,9 @@ class Corruption(Stage):
         note.text = ", ".join(parts) or "a copy is not copied again"
 
     def _flip(self, flight: Flight, bits: int) -> None:
-        count = min(bits, self._count(flight.words[Slot.CORRUPT], bits))
+        """Flip as many bits of the payload as of the `bits` that the network carries, or all it has."""
+        count, bits = self._count(flight.words[Slot.CORRUPT], bits), 8 * len(flight.payload)
+        count = min(bits, count)
         places: set[int] = set()
         block = FLIP_BLOCK
         while len(places) < count:

@@ -87,7 +87,7 @@ class CustomModel(Stage):
             flight.sequence,
             flight.copy,
             flight.sent_ns,
-            len(flight.payload),
+            flight.size,
             sqrt(dx * dx + dy * dy + dz * dz),
             walls,
             self._setup.words(flight, MODEL_BLOCK),

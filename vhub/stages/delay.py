@@ -2,7 +2,7 @@
 
 Jitter is never negative: a shape with support from 0, so that the mean is what is configured. Links are fifo by
 default. A request that begins or heals a clog moves the due times of packets in flight, as if it had been known when
-they were sent.
+they were sent. The latency of a sensor is added last, and delays no other packet.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Delay(Stage):
             if held_ns <= memory.last_due_ns:
                 held_ns = memory.last_due_ns + 1
             memory.last_due_ns = held_ns
-        flight.due_ns = held_ns
+        flight.due_ns = held_ns + flight.latency_ns
         if self._holds:
             flight.held_ns = held_ns - due_ns
         if self._air is not None:
@@ -85,6 +85,7 @@ class Delay(Stage):
             "bad time": self._bad_ns if row.is_bad else 0,
             "reordered": self._extra_ns if self.is_late(seen.flight) else 0,
             "clog": row.held_ns,
+            "the sensor's latency": seen.flight.latency_ns,
         }
         parts["order, after the one before it"] = max(0, row.due_ns - row.sent_ns - sum(parts.values()))
         note.facts = {what: ns for what, ns in parts.items() if ns}
@@ -101,7 +102,7 @@ class Delay(Stage):
 
         It is called in the order of sending, also for later packets without deferral.
         """
-        free_ns = flight.due_ns - flight.held_ns + by_ns
+        free_ns = flight.due_ns - flight.latency_ns - flight.held_ns + by_ns
         due_ns = self._held_ns(free_ns) if self._holds else free_ns
         if self._fifo and not (self._extra_ns and self.is_late(flight)):
             memory = self._memory
@@ -111,8 +112,8 @@ class Delay(Stage):
                 due_ns = before_ns + 1
             last_ns[link] = due_ns
             memory.last_due_ns = max(memory.last_due_ns, due_ns)
-        flight.put_off_ns += due_ns - flight.due_ns
-        flight.due_ns = due_ns
+        flight.put_off_ns += due_ns + flight.latency_ns - flight.due_ns
+        flight.due_ns = due_ns + flight.latency_ns
         if self._holds:
             flight.held_ns = due_ns - free_ns
 
@@ -123,13 +124,15 @@ class Delay(Stage):
         """
         last_ns = -1
         for flight, is_late in flights:
-            if flight.due_ns < now_ns:
+            due_ns = flight.due_ns - flight.latency_ns  # the network's part of it
+            if due_ns < now_ns:
                 continue
-            free_ns = flight.due_ns - flight.held_ns
-            flight.due_ns = self._held_ns(free_ns)
+            free_ns = due_ns - flight.held_ns
+            due_ns = self._held_ns(free_ns)
             if not is_late:
-                last_ns = flight.due_ns = max(flight.due_ns, last_ns + 1) if self._fifo else flight.due_ns
-            flight.held_ns = flight.due_ns - free_ns
+                last_ns = due_ns = max(due_ns, last_ns + 1) if self._fifo else due_ns
+            flight.held_ns = due_ns - free_ns
+            flight.due_ns = due_ns + flight.latency_ns
         if self._fifo:
             self._memory.last_due_ns = max(last_ns, min(self._memory.last_due_ns, now_ns))
 
@@ -152,5 +155,5 @@ class InOrder(Delay):
         memory, due_ns = self._memory, flight.sent_ns
         if due_ns <= memory.last_due_ns:
             due_ns = memory.last_due_ns = memory.last_due_ns + 1
-        flight.due_ns = due_ns
+        flight.due_ns = due_ns + flight.latency_ns
         return ""

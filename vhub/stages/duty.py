@@ -12,7 +12,7 @@ from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.memory import RadioState, Sending
-from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.packet import Flight, frames_of
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
@@ -59,7 +59,7 @@ class Duty(Stage):
                 flight.decided_by = shared.decided_by
                 return DUTY_CYCLE if shared.cause == DUTY_CYCLE else ""
         _forget(sender, flight.sent_ns - self._window_ns)
-        airtime_ns = self.airtime_ns(len(flight.payload), flight.published)
+        airtime_ns = self.airtime_ns(flight.size, flight.published)
         end_ns = max(flight.sent_ns + flight.phase_ns, sender.free_ns) + airtime_ns
         left_ns = max(0, self._allowed_ns - _sent_since(sender, end_ns - self._window_ns))
         if airtime_ns > left_ns:
@@ -77,13 +77,16 @@ class Duty(Stage):
             note.add(", {left_ns} is left of the one that ends with it", left_ns=row.decided_by.duty_left_ns)
 
     def airtime_ns(self, size: int, published: bool) -> int:
-        """Return the airtime of a payload of `size` bytes."""
+        """Return the airtime of a packet of `size` bytes."""
         settings = self._shared if self._broadcasts and published else self._settings
+        sizes = frames_of(size, settings.payload_max)
         if settings.medium == "lora":
-            bandwidth_hz = int(settings.bandwidth_hz)
-            return lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
+            what = int(settings.bandwidth_hz), settings.coding_rate
+            return sum([lora_airtime_ns(settings.spreading_factor, size, *what) for size in sizes])
         rate_bps = settings.rate_bps
-        return 0 if rate_bps is None else serialisation_ns(size + settings.overhead_bytes, rate_bps)
+        if rate_bps is None:
+            return 0
+        return sum([serialisation_ns(size + settings.overhead_bytes, rate_bps) for size in sizes])
 
 
 def note_sent(sender: RadioState, start_ns: int, end_ns: int, window_ns: int) -> None:

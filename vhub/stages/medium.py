@@ -3,23 +3,27 @@
 A wire serialises. On Wi-Fi a station freezes its backoff while stations that it hears send, contends with them, and
 repeats unacknowledged frames: others appear as delay to unicasts, and as loss to broadcasts, which are sent once.
 IEEE 802.15.4 looks before it sends. LoRa sends at once. Frames that are out of range are on air all the same.
+
+A packet longer than the mtu is sent in frames. Where frames are acknowledged and stations contend, each has a turn and
+retries of its own, and the packet ends with the first frame that is given up. Elsewhere its frames follow one another
+in one turn, and it is lost with any of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import groupby
 from typing import Final
 
-from foosim.common.keyed_random import UNIT, Slot, draw_words
+from foosim.common.keyed_random import UNIT, Slot, chance_threshold, draw_words
 from foosim.deployment.network.radios import Radio
 from foosim.vhub.network.air import Air
 from foosim.vhub.network.link_budget import Budget
 from foosim.vhub.network.link_context import BLOCK_SHIFT, LinkSetup
 from foosim.vhub.network.memory import RadioState, Sending, Transmission
-from foosim.vhub.network.packet import Flight
+from foosim.vhub.network.packet import Flight, frames_of
 from foosim.vhub.network.turns import Contest
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
@@ -51,6 +55,8 @@ SNR: Final = "snr"
 LRWPAN_MODE: Final = "oqpsk_250"
 ACCESS_BLOCK: Final = 16
 """The first block of a packet's draws for its attempts."""
+FRAME_BLOCKS: Final = 1 << 20
+"""From the blocks of one frame to those of the next of a packet."""
 BASE_STATION_DBM: Final = 30.0
 """A sender with at least this power over LTE is a base station: its packets are downlinks."""
 OPPORTUNITY_BYTES: Final = 1500
@@ -63,13 +69,13 @@ class Wire(Stage):
     def __init__(self, setup: LinkSetup) -> None:
         settings = setup.settings
         self._sender: RadioState = setup.sender
-        self._rate_bps, self._overhead = settings.rate_bps, settings.overhead_bytes
+        self._rate_bps, self._overhead, self._mtu = settings.rate_bps, settings.overhead_bytes, settings.payload_max
         self._trace, self._loops = setup.opportunities_ms, settings.trace is not None and settings.trace.loop
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
         start_ns = max(flight.sent_ns, sender.free_ns)
-        size = len(flight.payload) + self._overhead
+        size = flight.size + self._overhead * len(frames_of(flight.size, self._mtu))
         if self._trace:
             end_ns = self._opportunity_ns(start_ns, size)
         else:
@@ -148,6 +154,15 @@ class OnAir(Stage):
         note.add(", access {access_ns}, {retries} retries, ", access_ns=row.access_ns, retries=row.retries)
         note.facts["contenders"] = row.contenders
         _explain_airtime(seen, note, "air")
+        sizes = frames_of(row.size, (self._shared if seen.is_broadcast else self._settings).payload_max)
+        note.facts["frames"] = len(sizes)
+        if len(sizes) > 1:
+            lost = row.decided_by.frame
+            note.text += f", all attempts of {len(sizes)} frames" + (
+                f", of which number {lost} was lost" if lost else ""
+            )
+            note.facts["lost_frame"] = lost
+            return
         odds = self.odds(max(1, row.contenders), row.size, seen.is_broadcast)
         if odds is None:
             return
@@ -188,12 +203,41 @@ class OnAir(Stage):
         flight.contenders, flight.rate_bps, flight.outcome = shared.contenders, shared.rate_bps, shared.outcome
 
     def _transmit(self, flight: Flight, broadcast: bool, cause: str) -> None:
-        sender, air, source = self._sender, self._air, flight.source
-        air.advance(flight.sent_ns)
+        settings = self._shared if broadcast else self._settings
+        sender, lost = self._sender, UNIT if cause else None
+        self._air.advance(flight.sent_ns)
         ready_ns = flight.sent_ns + flight.phase_ns
         ready_ns = max(ready_ns, sender.free_ns)
+        sizes = frames_of(flight.size, settings.payload_max)
+        if len(sizes) == 1 or broadcast or not self.takes_turns:
+            self._take_turn(flight, broadcast, ready_ns, sizes, lost)
+        else:
+            self._take_turns(flight, ready_ns, sizes, lost)
+        sender.waiting.append((sender.free_ns, flight.size + settings.overhead_bytes * len(sizes)))
+
+    def _take_turns(self, flight: Flight, ready_ns: int, sizes: Sequence[int], lost: int | None) -> None:
+        """Send frames one after the other, each in a turn of its own, until one of them is given up."""
+        airtime_ns = retries = contenders = begun_ns = 0
+        for number, size in enumerate(sizes):
+            flight.frames = number + 1
+            self._take_turn(flight, False, self._sender.free_ns if number else ready_ns, (size,), lost)
+            begun_ns = begun_ns or flight.air_start_ns
+            airtime_ns, retries = airtime_ns + flight.airtime_ns, retries + flight.retries
+            contenders = max(contenders, flight.contenders)
+            if flight.outcome:
+                flight.decided_by = (number + 1,)
+                break
+        flight.airtime_ns, flight.retries, flight.contenders = airtime_ns, retries, contenders
+        flight.air_start_ns = begun_ns
+        flight.access_ns = flight.air_end_ns - ready_ns - airtime_ns
+
+    def _take_turn(
+        self, flight: Flight, broadcast: bool, ready_ns: int, sizes: Sequence[int], lost: int | None
+    ) -> None:
+        """Send frames in one turn of a sender that is ready."""
+        sender, air, source = self._sender, self._air, flight.source
         start_ns, flight.contenders = self.turn(ready_ns)
-        access, air_ns = self.access(flight, broadcast, UNIT if cause else None)
+        access, air_ns = self.access(flight, broadcast, sizes, lost)
         delay_ns, outcome = access.delay_ns, access.outcome
         start_ns = self.after_backoff(start_ns, access)
         end_ns, until_ns = start_ns + delay_ns, start_ns + access.occupancy_ns
@@ -206,13 +250,12 @@ class OnAir(Stage):
         else:
             flight.outcome = COLLISION if outcome in ("collision", "busy") else SNR
         sender.free_ns = until_ns
-        settings = self._shared if broadcast else self._settings
-        sender.waiting.append((until_ns, len(flight.payload) + settings.overhead_bytes))
         if self._window_ns:
             note_sent(sender, end_ns - airtime_ns, end_ns, self._window_ns)
         of = self._budget.propagation
         what = source, flight.sequence, flight.copy, end_ns - airtime_ns, end_ns, until_ns
         known = Transmission(*what, of.place(source).at, of.power_cdbm, self._factor)
+        known.frame = max(0, flight.frames - 1)
         if start_ns > flight.sent_ns:
             self.expect(known, ready_ns, start_ns)
         air.register(known)
@@ -220,6 +263,8 @@ class OnAir(Stage):
     # --- by kind of medium -------------------------------------------------------------------------------------------
 
     is_acknowledged = False
+    takes_turns = False
+    """Whether stations contend for each acknowledged frame."""
 
     def after_backoff(self, start_ns: int, access: Access) -> int:
         """Return when the sender's turn begins, given the time at which it would begin without back-off."""
@@ -232,21 +277,24 @@ class OnAir(Stage):
         """Return when the sender's turn begins, and the number of contenders, itself included."""
         return ready_ns, 1
 
-    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        """Return the outcome of a packet on the medium and the airtime of one attempt; set its bit rate.
+    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
+        """Return the outcome of frames on the medium and the airtime of an attempt of each; set the bit rate.
 
         `lost` is the threshold for errors of a packet that cannot get through; None where the signal decides.
         """
         settings = self._shared if broadcast else self._settings
         rate_bps = flight.rate_bps = settings.rate_bps or 0
-        airtime_ns = serialisation_ns(len(flight.payload) + settings.overhead_bytes, rate_bps) if rate_bps else 0
+        airtime_ns = (
+            sum([serialisation_ns(size + settings.overhead_bytes, rate_bps) for size in sizes]) if rate_bps else 0
+        )
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
-    def _words(self, flight: Flight, broadcast: bool) -> Words:
-        """Return the draws of a packet's attempts, by block: those of a broadcast are the same for all receivers."""
+    def _words(self, flight: Flight, broadcast: bool, frame: int = 0) -> Words:
+        """Return the draws of a frame's attempts, by block: those of a broadcast are the same for all receivers."""
         draws = self._setup.sending if broadcast else self._setup.draws
         key, number, copy = draws.of(flight.channel), flight.draw, flight.copy
-        return lambda block: draw_words(key, number, copy | (ACCESS_BLOCK + block) << BLOCK_SHIFT)
+        first = ACCESS_BLOCK + frame * FRAME_BLOCKS
+        return lambda block: draw_words(key, number, copy | (first + block) << BLOCK_SHIFT)
 
 
 def _explain_airtime(seen: Seen, note: Explanation, where: str) -> None:
@@ -288,18 +336,48 @@ Curve = Callable[[Flight, int], int]
 
 def error_curve(settings: Radio) -> Curve | None:
     """Return the curve of a radio's errors; None on media without errors."""
+    mtu = settings.payload_max
     if settings.medium == "wifi":
         modes = {errors.MODES[mode].rate_bps: mode for mode in wifi_modes(settings)}
-        return lambda flight, snr_cdb: errors.per_threshold(
-            modes[flight.rate_bps], snr_cdb, len(flight.payload) + WIFI_OVERHEAD_BYTES
+        return lambda flight, snr_cdb: any_threshold(
+            lambda size: errors.per_threshold(modes[flight.rate_bps], snr_cdb, size + WIFI_OVERHEAD_BYTES),
+            frames_of(flight.size, mtu),
         )
     if settings.medium == "ieee802154":
-        return lambda flight, snr_cdb: errors.per_threshold(
-            LRWPAN_MODE, snr_cdb, len(flight.payload) + LRWPAN_OVERHEAD_BYTES
+        return lambda flight, snr_cdb: any_threshold(
+            lambda size: errors.per_threshold(LRWPAN_MODE, snr_cdb, size + LRWPAN_OVERHEAD_BYTES),
+            frames_of(flight.size, mtu),
         )
     if settings.medium == "lte":
         return lambda flight, snr_cdb: UNIT if snr_cdb < errors.LTE_FLOOR_CENTI_DB else 0
     return None
+
+
+def any_threshold(of_frame: Callable[[int], int], sizes: Sequence[int]) -> int:
+    """Return the probability that any of some frames is lost, of which all but the last have one size (2^-64)."""
+    last = of_frame(sizes[-1])
+    if len(sizes) == 1:
+        return last
+    received, each = 1.0 - last / UNIT, 1.0 - of_frame(sizes[0]) / UNIT
+    for _ in sizes[1:]:
+        received *= each
+    return chance_threshold(1.0 - received)
+
+
+def in_a_row(accesses: Sequence[Access]) -> Access:
+    """Return the access of frames in a row, of which each is received before the next is sent."""
+    if len(accesses) == 1:
+        return accesses[0]
+    outcome = next((one.outcome for one in accesses if one.outcome != "ok"), accesses[0].outcome)
+    occupancy_ns = sum([one.occupancy_ns for one in accesses])
+    return Access(
+        occupancy_ns - accesses[-1].occupancy_ns + accesses[-1].delay_ns,
+        occupancy_ns,
+        sum([one.retries for one in accesses]),
+        sum([one.airtime_ns for one in accesses]),
+        outcome,
+        sum([one.backoff_ns for one in accesses]),
+    )
 
 
 @lru_cache(maxsize=64)
@@ -312,6 +390,7 @@ class WiFi(OnAir):
     """IEEE 802.11 with the distributed coordination function and rate control."""
 
     is_acknowledged = True
+    takes_turns = True
 
     def __init__(self, setup: LinkSetup) -> None:
         super().__init__(setup)
@@ -336,9 +415,15 @@ class WiFi(OnAir):
         known.ready_ns, known.turn_ns = ready_ns, turn_ns
         known.radio, known.hears = self._setup.radio, self._contest.hears
 
-    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
         """The fixed rate if set; else the lowest for a broadcast, the highest with few errors for a unicast."""
-        size, ack_ns, threshold = len(flight.payload), 0, 0
+        if len(sizes) == 1:
+            return self._access(flight, broadcast, sizes[0], max(0, flight.frames - 1), lost)
+        found = [self._access(flight, broadcast, size, frame, lost) for frame, size in enumerate(sizes)]
+        return in_a_row([access for access, _ in found]), sum([airtime_ns for _, airtime_ns in found])
+
+    def _access(self, flight: Flight, broadcast: bool, size: int, number: int, lost: int | None) -> tuple[Access, int]:
+        ack_ns, threshold = 0, 0
         if broadcast:
             frame = self._frames.broadcast(size)
         else:
@@ -348,7 +433,7 @@ class WiFi(OnAir):
             if lost is None:
                 flight.error_threshold = threshold
         flight.rate_bps = frame.rate_bps
-        words, airtime_ns = self._words(flight, broadcast), frame.airtime_ns
+        words, airtime_ns = self._words(flight, broadcast, number), frame.airtime_ns
         return wifi_access(words, flight.contenders, threshold, airtime_ns, ack_ns, self._timing), airtime_ns
 
     def odds(self, contenders: int, size: int, broadcast: bool) -> tuple[int, int]:
@@ -359,6 +444,7 @@ class LrWpan(OnAir):
     """IEEE 802.15.4 at 2.4 GHz without beacons."""
 
     is_acknowledged = True
+    takes_turns = True
 
     def __init__(self, setup: LinkSetup) -> None:
         super().__init__(setup)
@@ -367,15 +453,20 @@ class LrWpan(OnAir):
     def turn(self, ready_ns: int) -> tuple[int, int]:
         return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
 
-    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
-        size = len(flight.payload)
+    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
+        if len(sizes) == 1:
+            return self._access(flight, broadcast, sizes[0], max(0, flight.frames - 1), lost)
+        found = [self._access(flight, broadcast, size, frame, lost) for frame, size in enumerate(sizes)]
+        return in_a_row([access for access, _ in found]), sum([airtime_ns for _, airtime_ns in found])
+
+    def _access(self, flight: Flight, broadcast: bool, size: int, number: int, lost: int | None) -> tuple[Access, int]:
         flight.rate_bps = errors.MODES[LRWPAN_MODE].rate_bps
         airtime_ns = lrwpan_airtime_ns(size, self._timing)
         threshold = 0 if broadcast else lost
         if threshold is None:
             threshold = errors.per_threshold(LRWPAN_MODE, flight.snr_cdb, size + LRWPAN_OVERHEAD_BYTES)
             flight.error_threshold = threshold
-        words = self._words(flight, broadcast)
+        words = self._words(flight, broadcast, number)
         return csma_access(words, flight.contenders, threshold, airtime_ns, not broadcast, self._timing), airtime_ns
 
     def odds(self, contenders: int, size: int, broadcast: bool) -> tuple[int, int]:
@@ -386,12 +477,12 @@ class LrWpan(OnAir):
 class LoRa(OnAir):
     """LoRa: pure ALOHA."""
 
-    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
         settings = self._settings
         chips = settings.spreading_factor * 4 * int(settings.bandwidth_hz)
         flight.rate_bps = chips // ((4 + settings.coding_rate) << settings.spreading_factor)
-        size, bandwidth_hz = len(flight.payload), int(settings.bandwidth_hz)
-        airtime_ns = lora_airtime_ns(settings.spreading_factor, size, bandwidth_hz, settings.coding_rate)
+        what = int(settings.bandwidth_hz), settings.coding_rate
+        airtime_ns = sum([lora_airtime_ns(settings.spreading_factor, size, *what) for size in sizes])
         return Access(airtime_ns, airtime_ns, 0, airtime_ns, "ok"), airtime_ns
 
 
@@ -400,17 +491,24 @@ class Lte(OnAir):
 
     is_acknowledged = True
 
-    def access(self, flight: Flight, broadcast: bool, lost: int | None) -> tuple[Access, int]:
+    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
+        """Frames are repeated beside one another: the last one is there when the latest of them is."""
         settings = self._settings
         direction = "down" if settings.tx_power_dbm >= BASE_STATION_DBM else "up"
         rate_bps = flight.rate_bps = errors.lte_rate_bps(flight.snr_cdb, int(settings.bandwidth_hz), direction)
         if rate_bps == 0:
             return Access(0, 0, 0, 0, "error"), 0
-        airtime_ns = serialisation_ns(len(flight.payload) + settings.overhead_bytes, rate_bps)
-        retries, is_lost = errors.lte_harq(flight.words[Slot.BACKOFF])
-        delay_ns = airtime_ns + retries * errors.HARQ_ROUND_NS
-        outcome: Outcome = "error" if is_lost or lost is not None else "ok"
-        return Access(delay_ns, airtime_ns, retries, airtime_ns, outcome), airtime_ns
+        airtime_ns = delay_ns = all_retries = 0
+        outcome: Outcome = "ok" if lost is None else "error"
+        for frame, size in enumerate(sizes):
+            airtime_ns += serialisation_ns(size + settings.overhead_bytes, rate_bps)
+            word = self._words(flight, False, frame)(0)[0] if frame else flight.words[Slot.BACKOFF]
+            retries, is_lost = errors.lte_harq(word)
+            delay_ns = max(delay_ns, airtime_ns + retries * errors.HARQ_ROUND_NS)
+            all_retries += retries
+            if is_lost:
+                outcome = "error"
+        return Access(delay_ns, airtime_ns, all_retries, airtime_ns, outcome), airtime_ns
 
 
 _MEDIA: Final = {"radio": OnAir, "wifi": WiFi, "ieee802154": LrWpan, "lora": LoRa, "lte": Lte}

@@ -29,7 +29,12 @@ class Limits:
         self.packets, self.bytes_max, self.wait_ns = queue.packets, queue.bytes_max, queue.wait_ns
         self.codel = queue.drop == "codel"
         self.target_ns, self.interval_ns = queue.codel_target_ns, queue.codel_interval_ns
-        self.overhead = settings.overhead_bytes
+        self._mtu, self._overhead = settings.payload_max, settings.overhead_bytes
+
+    def size(self, flight: Flight) -> int:
+        """Return the bytes of a packet in the queue, with the overhead of each frame."""
+        frames = 1 if self._mtu is None or flight.size <= self._mtu else -(-flight.size // self._mtu)
+        return flight.size + self._overhead * frames
 
 
 class Queue(Stage):
@@ -63,7 +68,7 @@ class Queue(Stage):
             queued += size
         wait_ns = sender.free_ns - now_ns if sender.free_ns > now_ns else 0
         limits = self._shared if broadcast else self._own
-        cause = self._judge(limits, len(waiting), queued + len(flight.payload) + limits.overhead, now_ns, wait_ns)
+        cause = self._judge(limits, len(waiting), queued + limits.size(flight), now_ns, wait_ns)
         flight.queue_bytes, flight.queue_ns = queued, wait_ns
         if cause:
             flight.decided_by = self._numbers(limits, cause, len(waiting), now_ns + wait_ns)

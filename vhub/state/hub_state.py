@@ -16,6 +16,7 @@ import msgspec
 
 from foosim.common import limits
 from foosim.common.errors import Malformed
+from foosim.deployment.channel_kinds import PLAIN, carried_by
 from foosim.deployment.schema import Deployment
 from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import Deliveries, Sent
@@ -74,6 +75,7 @@ class HubState:
         self.sampling = Sampling(deployment)
         self._endpoints = frozenset(deployment.endpoints())
         self._robots = frozenset(deployment.robots)
+        self._carried = carried_by(deployment)
         self._transit = InFlightLimit(len(self._endpoints))
         self._here = Here(deployment, self.sampling.triggered)
         self.existence = Existence(deployment)
@@ -137,6 +139,9 @@ class HubState:
                 what = sequence, sent_ns, 0, packet.payload, published
                 flight = Flight(packet.robot, receiver, packet.channel, *what)
                 flight.draw, flight.count = draw, count
+                if self._carried:
+                    size, flight.latency_ns = self._carried.get((packet.robot, packet.channel), PLAIN)
+                    flight.size = flight.size if size is None else size
                 flights.append(flight)
             self._send(flights, tick, fates)
         released = self._arrive_at_clients(tick, fates)
@@ -353,6 +358,7 @@ class HubState:
                 what = flight.sequence, flight.sent_ns, flight.stamp_ns, flight.payload, flight.published
                 twin = Flight(flight.source, flight.destination, flight.channel, *what, copy=1)
                 twin.draw, twin.count = flight.draw, flight.count
+                twin.size, twin.latency_ns = flight.size, flight.latency_ns
                 twins.append(twin)
         if twins:
             self._send(twins, tick, fates)

@@ -50,6 +50,16 @@ class SensorSettings(ComponentSettings):
     offset_ns: Offset = default("0 s", "offset")
     modifiers: list[SerializeAsAny[ModifierSettings]] = Field(default=[], max_length=MODIFIERS_MAX)
 
+    @property
+    def carried_bytes(self) -> int | None:
+        """The size of a packet for the network, where that is not the length of its payload."""
+        return None
+
+    @property
+    def late_by_ns(self) -> int:
+        """By how much later than its tick and the network's delay a packet arrives."""
+        return 0
+
 
 class ActuatorSettings(ComponentSettings):
     """The settings of each actuator: the modifiers of its commands, in order."""
