@@ -218,8 +218,8 @@ class Impairments(SpecBase):
     corrupt: Corrupt | None = None
     duplicate: Probability = default("0 %")
     reorder: Reorder | None = None
-    payload_max: Bytes | None = Field(default=None, alias="mtu")
-    """The longest payload that it carries."""
+    payload_max: Annotated[int, Quantity(units.SIZE, "1 B", "1 GiB")] | None = Field(default=None, alias="mtu")
+    """The longest payload of a frame: a longer packet travels in several."""
     ttl_ns: Annotated[int, Quantity(units.TIME, "1 us", "1 h")] | None = Field(default=None, alias="ttl")
     """Packets with a greater delay are dropped (`expired`)."""
     allow: bool = True

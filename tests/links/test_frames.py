@@ -7,12 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Final
 
 import pytest
 
+from foosim.analysis.explain import PacketName, explain_packet
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PACKETS, PacketRow
 from foosim.common.keyed_random import UNIT
 from foosim.deployment.network.presets import PRESETS
+from foosim.simulation.run import rehearse
+from foosim.simulation.what_if import what_if
 from foosim.vhub.links.fabric import Fabric
 from foosim.vhub.network.packet import Flight, frames_of
 from foosim.vhub.radio.airtime import (
@@ -25,7 +31,7 @@ from foosim.vhub.radio.airtime import (
 )
 from foosim.vhub.radio.errors import per_threshold
 from foosim.vhub.radio.timings import CATEGORIES, WIFI_5, with_category
-from tests.links.offered import MS, S, deployment_of, fabric_of, fates, play
+from tests.links.offered import MS, TABLE, S, deployment_of, fabric_of, fates, play
 from tests.links.proof import Proof
 from tests.links.statistics import binomial_z, mean_and_deviation
 
@@ -173,3 +179,25 @@ def test_times_between_frames_belong_to_others() -> None:
     alone = picture(1, 0)
     play(wifi(f"mtu: {MTU} B,", None), [alone])
     assert long.due_ns > alone.due_ns, "its later frames wait for the other station"
+
+
+def test_the_frames_of_a_captured_packet_are_explained_and_judged_again(tmp_path: Path) -> None:
+    """Readings of 8 B a frame near the limit of IEEE 802.15.4: some get across with retries, some do not."""
+    radio = "air: {preset: zigbee, published: unicast, mtu: 8 B, shadowing: {on: false}, tx_power: -50 dBm}"
+    network = (
+        f"network={{radios: {{{radio}}}, robots: {{'*': [air]}}, "
+        "places: {camera: [0 m, 0 m, 2 m], 'player*': [3 m, 0 m, 1 m]}}"
+    )
+    path = tmp_path / "run.mcap"
+    rehearse(TABLE.read_text(), "t", 60, 2, [network], capture=path, folder=TABLE.parent)
+    capture = open_capture(path)
+    judged = what_if(capture)
+    assert (judged.changed, judged.inputs_changed) == (0, 0)
+    rows = [row for row in capture.rows(PACKETS) if isinstance(row, PacketRow) and row.size > 8]
+    lost = next(row for row in rows if row.cause == "snr" and row.decided_by.frame > 1)
+    got = next(row for row in rows if row.fate == "delivered" and row.retries)
+    for row, what in ((lost, f"number {lost.decided_by.frame} was lost"), (got, f"{got.retries} retries")):
+        found = explain_packet(capture, PacketName(row.source, row.sequence, row.destination))
+        steps = {step.stage: step for step in found.steps}
+        assert steps["admission"].facts["frames"] == len(frames_of(row.size, 8))
+        assert what in steps["medium"].text and found.agrees

@@ -227,7 +227,7 @@ def test_packets_that_do_not_fit_into_a_queue_are_named(limit: int) -> None:
 def test_commands_of_a_fixed_or_a_jointed_size_that_do_not_fit_into_a_queue_are_named() -> None:
     """Four rotors have 32 B, an arm of seven joints 56 B."""
     path = TABLE.with_name("yard.yaml")
-    links = "network.links=[{id: thin, from: '*', to: '*', rate: 1 Mbit/s, queue: {bytes: 31 B}}]"
+    links = "network.links=[{id: thin, from: '*', to: [arm, eagle], rate: 1 Mbit/s, queue: {bytes: 31 B}}]"
     made = read_for_stepping(path, [links])
     (text,) = warnings_of(made)
     assert "arm joints (56 B)" in text and "eagle rotors (32 B)" in text

@@ -52,7 +52,7 @@ class SensorSettings(ComponentSettings):
 
     @property
     def carried_bytes(self) -> int | None:
-        """The size of a packet for the network, where that is not the length of its payload."""
+        """The size of a packet for the network; None: the length of its payload."""
         return None
 
     @property
