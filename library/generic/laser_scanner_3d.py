@@ -32,8 +32,8 @@ class LaserScanner3dSettings(SightSettings):
     """The distances from `at` to the first thing on each beam, from `least` to `range`, of `rows` of `columns` beams.
 
     Rows are at equal steps from `lowest` to `highest` above the plane of x and y of the mount, a single one half-way.
-    Columns are over `angle`, as the beams of a `laser_scanner`: from right to left of x, a full turn begins behind. A
-    reading leaves `latency` after its tick; `size` is what the network carries, by default 3 bytes a beam.
+    Columns are over `angle`, as the beams of a `laser_scanner`: from right to left of x, a full turn begins behind. `latency`
+    is added to the delay of the network; `size` is what the network carries, by default 3 bytes a beam.
     """
 
     rows: Annotated[int, Field(ge=1, le=64)]
@@ -62,9 +62,9 @@ class LaserScanner3dSettings(SightSettings):
         return [(x * across, y * across, up) for across, up in rises for x, y, _ in level]
 
     @property
-    def size(self) -> int:
-        """The bytes that the network carries for a scan."""
-        return self.rows * self.columns * BYTES if self.size_bytes is None else self.size_bytes
+    def encoded_bytes(self) -> int:
+        """The bytes of a scan as usual scanners send it."""
+        return self.rows * self.columns * BYTES
 
     @property
     def optics(self) -> Optics:
