@@ -32,8 +32,8 @@ class LaserScanner3dSettings(SightSettings):
     """The distances from `at` to the first thing on each beam, from `least` to `range`, of `rows` of `columns` beams.
 
     Rows are at equal steps from `lowest` to `highest` above the plane of x and y of the mount, a single one half-way.
-    Columns are over `angle`, as the beams of a `laser_scanner`: from right to left of x, a full turn begins behind. `latency`
-    is added to the delay of the network; `size` is what the network carries, by default 3 bytes a beam.
+    Columns are over `angle`, as the beams of a `laser_scanner`: from right to left of x, a full turn begins behind.
+    `latency` is added to the delay of the network; `size` is what the network carries, by default 3 bytes a beam.
     """
 
     rows: Annotated[int, Field(ge=1, le=64)]

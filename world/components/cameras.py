@@ -73,11 +73,27 @@ class EyeSettings(SensorSettings):
 class SightSettings(EyeSettings):
     """The settings of what is drawn where it is looked at.
 
-    A reading leaves `latency` after its tick. `size` is what the network carries: by default that of a usual encoding.
+    `latency` is added to the delay of the network. `size` is what the network carries: by default that of a usual
+    encoding.
     """
 
     latency_ns: Latency = default("0 s", "latency")
     size_bytes: Size | None = Field(default=None, alias="size")
+
+    @property
+    def encoded_bytes(self) -> int:
+        """The bytes of a usual encoding of what is drawn."""
+        return 0
+
+    @property
+    def carried_bytes(self) -> int:
+        """The bytes that the network carries for a reading."""
+        return self.encoded_bytes if self.size_bytes is None else self.size_bytes
+
+    @property
+    def late_by_ns(self) -> int:
+        """The latency."""
+        return self.latency_ns
 
 
 class ViewSettings(EyeSettings):
@@ -130,9 +146,9 @@ class PictureSettings(ViewSettings, SightSettings):
     distortion: Distortion = Distortion()
 
     @property
-    def size(self) -> int:
-        """The bytes that the network carries for a picture."""
-        return round(self.width * self.height * self.bytes_per_pixel) if self.size_bytes is None else self.size_bytes
+    def encoded_bytes(self) -> int:
+        """The bytes of a usual encoding of a picture."""
+        return round(self.width * self.height * self.bytes_per_pixel)
 
     @property
     def optics(self) -> Optics:
