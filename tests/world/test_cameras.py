@@ -220,6 +220,6 @@ def test_sizes_follow_the_pixels() -> None:
     sizes = {}
     for kind, more in product(("camera", "depth_camera", "segmentation", "rgbd"), ("", ", size: 9 kB")):
         settings: Any = with_eye(f"kind: {kind}, {ABOVE}{more}").robots["camera"].sensors["eye"]
-        sizes[kind, more] = settings.size
+        sizes[kind, more] = settings.carried_bytes
     assert [size for (_, more), size in sizes.items() if not more] == [20160, 57600, 2880, 77760]
     assert {size for (_, more), size in sizes.items() if more} == {9000}

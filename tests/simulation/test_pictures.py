@@ -1,0 +1,52 @@
+"""Pictures at the readers: live, from captures, on any number of nodes, stepped from Python, as observations."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from foosim.capture.reader import open_capture
+from foosim.common.errors import UnknownName
+from foosim.deployment.channel_kinds import channel_codec
+from foosim.simulation.env import FoosimEnv
+from foosim.simulation.run import rehearse
+from tests.deployed import TABLE, TEXT
+from tests.looking import LOOKED, LOOKERS
+
+LENS = "width: 64, height: 36, noise: 4"
+EYE = f"robots.camera.sensors.eye={{kind: rgbd, rate: 50 Hz, at: {{z: 1.2 m}}, look_at: {{entity: ball}}, {LENS}}}"
+
+
+def test_pictures_are_equal_live_and_from_captures_on_any_number_of_nodes(tmp_path: Path) -> None:
+    live = []
+    for nodes in (1, 2, 3):
+        LOOKED.clear()
+        found = rehearse(TEXT, TABLE.name, 40, nodes, (EYE, LOOKERS), capture=tmp_path / f"{nodes}.mcap")
+        assert not found.json["failed"], found.json["reason"]
+        live.append(dict(LOOKED))
+    assert live[0] == live[1] == live[2] and len(set(live[0].values())) > 2
+    capture = open_capture(tmp_path / "3.mcap")
+    codec = channel_codec(capture.deployment, "camera", "eye")
+    assert codec is not None
+    packets = capture.packets.where(capture.packets.channel == "eye").payload
+    seen = {int(sight.tick): sight.image() for sight in map(codec.decode, reversed(packets))}
+    assert live[0].items() <= {tick: sha256(image.tobytes()).hexdigest() for tick, image in seen.items()}.items()
+
+
+def test_an_environment_observes_pictures() -> None:
+    env = FoosimEnv(TABLE, sets=[EYE, LOOKERS], pictures=["camera/eye"])
+    assert isinstance(env.observation_space, spaces.Dict)
+    first, _ = env.reset()
+    second, *_ = env.step(np.zeros(len(env.columns[1])))
+    assert env.observation_space.contains(first) and env.observation_space.contains(second)
+    assert sorted(second) == ["camera/eye.depth", "camera/eye.image", "readings"]
+    sight = env.simulation.readings["camera", "eye"].value
+    assert np.array_equal(second["camera/eye.image"], sight.image())  # type: ignore[union-attr]
+    assert sight.kept["drawn_by"].draws <= 2  # type: ignore[union-attr]
+    env.close()
+    with pytest.raises(UnknownName, match="waver hears no camera"):
+        FoosimEnv(TABLE, sets=[LOOKERS.replace("[eye]", "[ball]")], pictures=["*"])
