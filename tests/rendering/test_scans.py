@@ -101,7 +101,7 @@ def test_what_is_no_scan_is_refused(fleet_text: Text) -> None:
         with pytest.raises(DeploymentError, match=message):
             hall(fleet_text, setting)
     deployment, layout = hall(fleet_text, "size=5 kB")
-    assert deployment.robots["rover01"].sensors["eye"].size == 5000  # type: ignore[attr-defined]
+    assert deployment.robots["rover01"].sensors["eye"].carried_bytes == 5000
     its = sensors_of(deployment, layout, layout["rover01"])
     numbers = initial_numbers(deployment, layout)
     alone = next(one for one in its if one.channel == "eye").sample(SensingView(0, numbers, np.array(numbers)))
