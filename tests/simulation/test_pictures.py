@@ -17,22 +17,25 @@ from foosim.simulation.run import rehearse
 from tests.deployed import TABLE, TEXT
 from tests.looking import LOOKED, LOOKERS
 
-LENS = "width: 64, height: 36, noise: 4"
+LENS = "width: 64, height: 36, noise: 4, size: 9 kB, latency: 15 ms"
 EYE = f"robots.camera.sensors.eye={{kind: rgbd, rate: 50 Hz, at: {{z: 1.2 m}}, look_at: {{entity: ball}}, {LENS}}}"
 
 
 def test_pictures_are_equal_live_and_from_captures_on_any_number_of_nodes(tmp_path: Path) -> None:
+    """The network carries their size, and adds the latency to its delay."""
     live = []
     for nodes in (1, 2, 3):
         LOOKED.clear()
-        found = rehearse(TEXT, TABLE.name, 40, nodes, (EYE, LOOKERS), capture=tmp_path / f"{nodes}.mcap")
+        found = rehearse(TEXT, TABLE.name, 60, nodes, (EYE, LOOKERS), capture=tmp_path / f"{nodes}.mcap")
         assert not found.json["failed"], found.json["reason"]
         live.append(dict(LOOKED))
     assert live[0] == live[1] == live[2] and len(set(live[0].values())) > 2
     capture = open_capture(tmp_path / "3.mcap")
     codec = channel_codec(capture.deployment, "camera", "eye")
     assert codec is not None
-    packets = capture.packets.where(capture.packets.channel == "eye").payload
+    pictures = capture.packets.where(capture.packets.channel == "eye")
+    assert set(pictures.size) == {9000} and (pictures.due_ns - pictures.sent_ns >= 16_000_000).all()
+    packets = pictures.payload
     seen = {int(sight.tick): sight.image() for sight in map(codec.decode, reversed(packets))}
     assert live[0].items() <= {tick: sha256(image.tobytes()).hexdigest() for tick, image in seen.items()}.items()
 
