@@ -30,7 +30,7 @@ from foosim.world.components.optics import Optics, moving_links
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout, build_layout
 from foosim.world.matter.mesh import Mesh
-from foosim.world.scene import Box, Capsule, Cylinder, Hull, Scene, Shape, Sphere, looks_of, place, rotate
+from foosim.world.scene import Box, Capsule, Cylinder, Hull, Scene, Shape, Sphere, drawn, looks_of, place, rotate
 
 SIZES: Final = ((320, 180), (640, 480))
 TURNS: Final = 15
@@ -59,7 +59,7 @@ class TinyRenderer:
         self._moving: list[tuple[int, Shape, int]] = []
         self._things: list[int] = []
         scenery = list(dict.fromkeys(shape.name for shape in scene.scenery))
-        for shape in scene.scenery:
+        for shape in drawn(scene.scenery):
             self._add(shape, len(layout.names) + scenery.index(shape.name), shape.position, shape.orientation)
         moving = moving_links(scene)
         bodies = sorted(scene.bodies.items())

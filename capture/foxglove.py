@@ -39,7 +39,7 @@ from foosim.world.frame import Frame
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity
 from foosim.world.matter.mesh import Mesh
-from foosim.world.scene import Body, Box, Capsule, Hull, Shape, Sphere, Vector, looks_of, moved, rotate
+from foosim.world.scene import Body, Box, Capsule, Hull, Shape, Sphere, Vector, drawn, looks_of, moved, rotate
 from foosim.world.scene import Quaternion as Turn
 
 WORLD_FRAME: Final = "world"
@@ -92,7 +92,7 @@ class View:
         deletions = [
             SceneEntityDeletion(timestamp=at, type=SceneEntityDeletionType.MatchingId, id=link.name) for link in gone
         ]
-        entities = [_entity(at, SCENERY, WORLD_FRAME, self._scenery)]
+        entities = [_entity(at, SCENERY, WORLD_FRAME, drawn(self._scenery))]
         for link, shapes in looks_of(link for _, body in self._present for link in body.links):
             entities.append(_entity(at, link.name, link.name, shapes))
         return SceneUpdate(deletions=deletions, entities=entities).encode()

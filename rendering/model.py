@@ -16,7 +16,7 @@ from foosim.world.components.optics import moving_links
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
 from foosim.world.matter.mesh import Mesh
-from foosim.world.scene import ORIGIN, UPRIGHT, Colour, Pose, Quaternion, Scene, Shape, Vector, looks_of
+from foosim.world.scene import ORIGIN, UPRIGHT, Colour, Pose, Quaternion, Scene, Shape, Vector, drawn, looks_of
 
 SUN: Final[Vector] = (0.384, 0.288, 0.8772684879784524)
 """The direction to the sun, of length 1."""
@@ -38,7 +38,7 @@ class Model:
 
     def __init__(self, scene: Scene, layout: Layout) -> None:
         scenery: dict[str, list[Shape]] = {}
-        for shape in scene.scenery:
+        for shape in drawn(scene.scenery):
             scenery.setdefault(shape.name, []).append(shape)
         self.things = (*layout.names, *scenery)
         building = _Building()

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Corners = tuple[Floats, Floats]
 """Positions (m) and unit normals of the corners of triangles, (t, 3, 3) each, counter-clockwise from outside."""
 
-SIDES: Final = (16, 24, 32, 48, 64)
+SIDES: Final = (12, 16, 24, 32, 48, 64)
 FLAT_M: Final = 0.0006
 """How far the middle of a face may lie inside of its corners."""
 CREASE: Final = 0.75

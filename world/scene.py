@@ -73,6 +73,7 @@ class Shape:
     """A geometry at a pose in its link (in the world for scenery), its surface (a key of the physics') and colour.
 
     `radio` is its loss of waves; `name` is that of the scenery it belongs to, empty in a body, which has its own.
+    `visuals` is what a shape of scenery looks like, in its link's frame; without any it looks as it is (`drawn`).
     """
 
     geometry: Geometry
@@ -82,6 +83,7 @@ class Shape:
     orientation: Quaternion = UPRIGHT
     radio: RadioMaterial = UNKNOWN
     name: str = ""
+    visuals: tuple[Shape, ...] = ()
 
 
 JointKind: TypeAlias = Literal["free", "prismatic", "revolute", "continuous", "fixed"]
@@ -196,6 +198,12 @@ class Scene:
 
     bodies: Mapping[str, Body]
     scenery: tuple[Shape, ...]
+
+
+def drawn(scenery: Iterable[Shape]) -> Iterator[Shape]:
+    """Yield what scenery looks like: the visuals of a shape, without any the shape."""
+    for shape in scenery:
+        yield from shape.visuals or (shape,)
 
 
 def looks_of(links: Iterable[Link]) -> list[tuple[Link, tuple[Shape, ...]]]:

@@ -27,6 +27,7 @@ from foosim.world.scene import (
     Shape,
     Sphere,
     Vector,
+    drawn,
     enclosing,
     looks_of,
     shape_box,
@@ -75,7 +76,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
                 "jobs": jobs_content(deployment, name),
             }
         )
-    scenery = _shapes(scene.scenery, meshes)
+    scenery = _shapes(drawn(scene.scenery), meshes)
     return {
         "layout": layout.digest.hex(),
         "links": links,

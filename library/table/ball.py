@@ -18,8 +18,7 @@ from foosim.world.components.view import Mounting, View, WritableView
 from foosim.world.matter.materials import PLASTIC
 from foosim.world.scene import ORIGIN, Body, Colour, Link, Shape, Sphere, Vector
 
-ORANGE: Final[Colour] = (1.0, 0.5, 0.0, 1.0)
-"""A white ball would be confused with highlights on the rods."""
+WHITE: Final[Colour] = (1.0, 1.0, 0.98, 1.0)
 
 
 @model(
@@ -51,7 +50,7 @@ class Ball(Model):
         """Return the sphere."""
         ball = self._table.ball
         inertia = 0.4 * ball.mass * ball.radius * ball.radius
-        shape = Shape(Sphere(ball.radius), "ball", ORANGE, radio=PLASTIC)
+        shape = Shape(Sphere(ball.radius), "ball", WHITE, radio=PLASTIC)
         link = Link(self._name, "free", (shape,), ball.mass, (inertia, inertia, inertia))
         return Body(self._name, "ball", ORIGIN, (link,), speed_limit=ball.speed_limit)
 

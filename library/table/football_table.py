@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from collections.abc import Iterator
+from dataclasses import replace
+from math import ceil, sqrt
 from typing import Final
 
 from foosim.library.table.settings import TABLE, Floor, Goal, Playfield, Ramps, Strips, Table, Walls
 from foosim.world.component_types.registry import scene
 from foosim.world.component_types.settings import SceneSettings
 from foosim.world.matter import materials
-from foosim.world.scene import Box, Colour, Shape, Vector
+from foosim.world.scene import Box, Colour, Cylinder, Geometry, Shape, Vector, moved, rotate
 
 GREEN: Final[Colour] = (0.16, 0.45, 0.24, 1.0)
 DARK_GREEN: Final[Colour] = (0.13, 0.38, 0.20, 1.0)
 WOOD: Final[Colour] = (0.45, 0.30, 0.18, 1.0)
 GREY: Final[Colour] = (0.35, 0.35, 0.38, 1.0)
+WHITE: Final[Colour] = (0.93, 0.93, 0.93, 1.0)
+LINE_M: Final = 0.0002
+"""How far a line is above what it is drawn on: visible to a camera, and less than a depth is accurate."""
 
 _COS_EIGHTH: Final = sqrt((1.0 + sqrt(0.5)) / 2.0)
 _SIN_EIGHTH: Final = sqrt((1.0 - sqrt(0.5)) / 2.0)
@@ -40,9 +45,13 @@ class FootballTableSettings(SceneSettings):
 
 @scene("football_table", FootballTableSettings)
 def table_scenery(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
-    """Floor, walls, goals, ramps and strips; boxes only, since a concave mesh lets fast balls through."""
-    walls = (*_side_walls(table), *_end_walls(table))
-    return (_floor(table), *walls, *_goals(table), *_ramps(table), *_strips(table))
+    """Floor, walls, goals, ramps and strips; boxes only, since a concave mesh lets fast balls through.
+
+    Where these reach under or behind others, they are drawn otherwise: as a cabinet with a field in it.
+    """
+    floor = replace(_floor(table), visuals=(*_field(table), *_lines(table)))
+    walls = (*_cabinet(table, _side_walls(table)), *_end_walls(table))
+    return (floor, *walls, *_goals(table), *_ramps(table), *_strips(table))
 
 
 def _box(low: Vector, high: Vector, surface: str, colour: Colour) -> Shape:
@@ -64,6 +73,55 @@ def _floor(table: Table | FootballTableSettings) -> Shape:
     x = table.field.length / 2 + 2 * table.walls.thickness + table.goal.depth
     y = table.field.width / 2 + table.walls.thickness
     return _box((-x, -y, -table.floor.thickness), (x, y, 0.0), "floor", GREEN)
+
+
+def _field(table: Table | FootballTableSettings) -> Iterator[Shape]:
+    """Yield the field between the walls, and the floors of the goals."""
+    x, y, thick, post = table.field.length / 2, table.field.width / 2, table.floor.thickness, table.goal.width / 2
+    yield _box((-x, -y, -thick), (x, y, 0.0), "floor", GREEN)
+    yield from _mirrored((x, -post, -thick), (_back(table), post, 0.0), "floor", GREY)
+
+
+def _lines(table: Table | FootballTableSettings) -> Iterator[Shape]:
+    """Yield halfway line, circle, spots and goal areas: flat shapes, each a little above those before."""
+    length, width = table.field.length, table.field.width
+    thin, circle, spot = 0.004 * length, 0.14 * width, 0.008 * length
+    for radius, level, colour in ((circle, 1, WHITE), (circle - thin, 2, GREEN), (spot, 3, WHITE)):
+        yield _flat(Cylinder(radius, 2.0 * level * LINE_M), 0.0, 0.0, colour)
+    yield _flat(Box((thin / 2, width / 2, 3.0 * LINE_M)), 0.0, 0.0, WHITE)
+    y, depth = min(0.75 * table.goal.width, width / 2 - table.ramps.leg), 0.1 * length
+    for side in (-1.0, 1.0):
+        front = side * (length / 2 - depth)
+        yield _flat(Cylinder(spot, 2.0 * LINE_M), side * 0.25 * length, 0.0, WHITE)
+        yield _flat(Box((thin / 2, y, LINE_M)), front, 0.0, WHITE)
+        for edge in (-y, y):
+            yield _flat(Box((depth / 2, thin / 2, LINE_M)), side * (length - depth) / 2, edge, WHITE)
+
+
+def _flat(geometry: Geometry, x: float, y: float, colour: Colour) -> Shape:
+    return Shape(geometry, "floor", colour, (x, y, 0.0), name=TABLE)
+
+
+def _back(table: Table | FootballTableSettings) -> float:
+    """Return the x of the insides of the goals' backs."""
+    return table.field.length / 2 + table.walls.thickness + table.goal.depth
+
+
+def _cabinet(table: Table | FootballTableSettings, walls: tuple[Shape, ...]) -> Iterator[Shape]:
+    """Yield the side walls, drawn down to the floor's lower face and on around the goals, with a deck above these."""
+    thick, inner = table.walls.thickness, table.field.width / 2
+    outer, back, under = table.field.length / 2 + thick, _back(table) + 1.2 * thick, -table.floor.thickness
+    top = max(table.walls.height, table.goal.height + 1.5 * thick)
+    for wall, side in zip(walls, (1.0, -1.0), strict=True):
+        y, end = side * (inner + thick / 2), side * back
+        low, high = sorted((end, end - side * thick))
+        west, east = sorted((end, side * outer))
+        visuals = (
+            _box((-back, y - thick / 2, under), (back, y + thick / 2, table.walls.height), "walls", WOOD),
+            _box((low, -inner, under), (high, inner, top), "walls", WOOD),
+            _box((west, -inner, top - thick / 2), (east, inner, top), "walls", WOOD),
+        )
+        yield replace(wall, visuals=visuals)
 
 
 def _side_walls(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
@@ -105,7 +163,8 @@ def _ramps(table: Table | FootballTableSettings) -> tuple[Shape, ...]:
     """Return a tilted box in each corner whose upper face rises from the floor to the corner, within both walls."""
     if table.ramps.height == 0.0 or table.ramps.leg == 0.0:
         return ()
-    return tuple(_ramp(table, side_x, side_y) for side_x, side_y in _TO_CORNER)
+    ramps = [_ramp(table, side_x, side_y) for side_x, side_y in _TO_CORNER]
+    return tuple(replace(ramp, visuals=tuple(_between_walls(table, ramp))) for ramp in ramps)
 
 
 def _ramp(table: Table | FootballTableSettings, side_x: float, side_y: float) -> Shape:
@@ -126,6 +185,17 @@ def _ramp(table: Table | FootballTableSettings, side_x: float, side_y: float) ->
     )
     box = Box((slope / 2.0, run, thick / 2.0))
     return Shape(box, "ramps", DARK_GREEN, middle, orientation, materials.WOOD, TABLE)
+
+
+def _between_walls(table: Table | FootballTableSettings, ramp: Shape) -> Iterator[Shape]:
+    """Yield a ramp in boxes that become narrower towards the corner, so that all of them end within the walls."""
+    assert isinstance(ramp.geometry, Box)
+    half, run, deep = ramp.geometry.half
+    count = ceil(run / table.walls.thickness)
+    for number in range(count):
+        width, x = run * (count - number) / count, half * ((2 * number + 1) / count - 1.0)
+        middle = moved(ramp.position, rotate(ramp.orientation, (x, 0.0, deep / 2)), 1.0)
+        yield replace(ramp, geometry=Box((half / count, width, deep / 2)), position=middle)
 
 
 def _strips(table: Table | FootballTableSettings) -> tuple[Shape, ...]:

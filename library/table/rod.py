@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import sqrt
 from typing import Final
 
@@ -14,9 +15,12 @@ from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.matter.materials import METAL, PLASTIC
-from foosim.world.scene import Body, Box, Colour, Cylinder, Link, Quaternion, Shape, Vector
+from foosim.world.scene import Body, Box, Colour, Cylinder, Link, Quaternion, Shape, Sphere, Vector
 from foosim.world.spec import WorldSpec
 
+RUBBER: Final[Colour] = (0.08, 0.08, 0.08, 1.0)
+SKIN: Final[Colour] = (0.85, 0.62, 0.47, 1.0)
+WHITE: Final[Colour] = (0.93, 0.93, 0.93, 1.0)
 STEEL: Final[Colour] = (0.75, 0.75, 0.78, 1.0)
 TEAM_COLOURS: Final[dict[str, Colour]] = {"red": (0.80, 0.10, 0.10, 1.0), "blue": (0.10, 0.20, 0.80, 1.0)}
 ALONG_Y: Final[Quaternion] = (-sqrt(0.5), 0.0, 0.0, sqrt(0.5))
@@ -94,10 +98,13 @@ class Rod(Model):
             inertia=(thin, rod.carriage_mass * rod.radius * rod.radius, thin),
             axis=Y_AXIS,
             limits=(-line.half_stroke, line.half_stroke),
+            visuals=(tube, *_grips(table, -1.0 if self._settings.team == "red" else 1.0)),
         )
-        figures = _figures(table, line, TEAM_COLOURS[self._settings.team])
+        colour = TEAM_COLOURS[self._settings.team]
+        figures = _figures(table, line, colour)
         inertia = across, about + around, upwards
         spin = Link(f"{name}/spin", "continuous", figures, mass, inertia, (0.0, 0.0, centre), Y_AXIS, parent=0)
+        spin = replace(spin, visuals=tuple(_drawn_figures(table, line, colour)))
         x = line_x_m(self._at.spec, self._settings)
         return Body(name, "rod", (x, 0.0, rod.axis_height), (slide, spin))
 
@@ -140,6 +147,27 @@ def _figures(table: Table, line: Line, colour: Colour) -> tuple[Shape, ...]:
         shapes.append(Shape(foot, "figures", colour, (0.0, y, foot_z), radio=PLASTIC))
         shapes.append(Shape(body, "figures", colour, (0.0, y, body_z), radio=PLASTIC))
     return tuple(shapes)
+
+
+def _grips(table: Table, side: float) -> Iterator[Shape]:
+    """Yield the grip at the end of a rod at y of this sign, and the cap at the other end."""
+    rod = table.rod
+    for way, radius, long in ((side, 2.0 * rod.radius, 0.1 * rod.length), (-side, 1.3 * rod.radius, 0.01 * rod.length)):
+        yield Shape(Cylinder(radius, long), "rods", RUBBER, (0.0, way * (rod.length - long) / 2, 0.0), ALONG_Y)
+
+
+def _drawn_figures(table: Table, line: Line, colour: Colour) -> Iterator[Shape]:
+    """Yield what figures look like: feet, legs, a body around the rod, and a head above it."""
+    rod = table.rod
+    long, wide, tall = rod.body.length / 2, rod.body.width / 2, rod.body.height
+    head = 0.8 * min(long, wide)
+    low = rod.foot.height - rod.foot_radius
+    for y in figure_ys(line):
+        foot = Box((rod.foot.length / 2, rod.foot.width / 2, rod.foot.height / 2))
+        yield Shape(foot, "figures", colour, (0.0, y, low - rod.foot.height / 2))
+        yield Shape(Box((0.7 * long, 0.7 * wide, 0.2 * tall)), "figures", WHITE, (0.0, y, low + 0.2 * tall))
+        yield Shape(Box((long, wide, 0.27 * tall)), "figures", colour, (0.0, y, low + 0.65 * tall))
+        yield Shape(Sphere(head), "figures", SKIN, (0.0, y, max(low + tall - head, rod.radius + 0.7 * head)))
 
 
 def _spin_mass(table: Table, line: Line) -> tuple[float, float, Vector]:

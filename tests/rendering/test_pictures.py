@@ -19,6 +19,7 @@ from foosim.common.errors import Malformed
 from foosim.deployment.loader import load_deployment
 from foosim.kernels import raster
 from foosim.rendering.drawer import Drawer, Drawn
+from foosim.rendering.model import Model
 from foosim.world.assembly.world import build_scene, initial_numbers
 from foosim.world.bodies.hull import convex_hull
 from foosim.world.components.optics import Optics, moving_links
@@ -37,9 +38,12 @@ from foosim.world.scene import (
     Shape,
     Sphere,
     Vector,
+    drawn,
+    enclosing,
     from_rpy,
     looks_of,
     rotate,
+    shape_box,
 )
 from foosim.world.scene import place as placed
 
@@ -384,3 +388,14 @@ def test_rays_of_columns_are_those_of_axes() -> None:
         focal = 80 / tan(0.6)
         wanted = (80 - focal * way[1] / 2, 60 - focal * way[2] / 2)
         assert (columns.mean() + 0.5, rows.mean() + 0.5) == pytest.approx(wanted, abs=0.5), (column, row)
+
+
+def test_a_table_looks_like_a_cabinet_from_all_sides() -> None:
+    """No floor, ramp or goal is visible from outside, and a picture of it stays quick."""
+    table = Table()
+    shapes = list(drawn(table.scene.scenery))
+    low, high = enclosing([shape_box(one) for one in shapes if one.surface == "walls"])
+    inner_low, inner_high = enclosing([shape_box(one) for one in shapes if one.surface != "walls"])
+    assert all(low[axis] < inner_low[axis] and inner_high[axis] < high[axis] for axis in (0, 1))
+    assert low[2] <= inner_low[2] and inner_high[2] <= high[2]
+    assert 5_000 < len(Model(table.scene, table.layout).triangles) < 9_000

@@ -28,6 +28,7 @@ from foosim.vhub.recording.model_hash import model_hash
 from foosim.world.assembly.world import build_scene
 from foosim.world.frame import CHAIN_START, chain_next
 from foosim.world.kinematics import forward_kinematics
+from foosim.world.scene import drawn, looks_of
 from tests.vhub.conftest import RECOVERED, noise
 
 if TYPE_CHECKING:
@@ -298,7 +299,7 @@ def test_viewers_get_the_scene_at_the_start_and_when_it_changes(path: Path, hub_
     assert {entity.id for entity in first.entities} == {"scenery", *links} - {"ball-2"}
     for entity in first.entities:
         assert entity.frame_locked and entity.frame_id == ("world" if entity.id == "scenery" else entity.id)
-        shapes = scene.scenery if entity.id == "scenery" else links[entity.id].shapes
+        shapes = [*drawn(scene.scenery)] if entity.id == "scenery" else looks_of([links[entity.id]])[0][1]
         assert len(entity.cubes) + len(entity.spheres) + len(entity.cylinders) == len(shapes) > 0
     ball = next(entity for entity in first.entities if entity.id == "ball").spheres[0]
     assert (ball.size.x, ball.color.r, ball.color.a) == (2 * table_of(hub_run.deployment).ball.radius, 1.0, 1.0)
