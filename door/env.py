@@ -5,18 +5,19 @@ To import this registers its environments with Gymnasium: `gymnasium.make("foosi
 
 from foosim.client.vectors import Column
 from foosim.library.table.learning.table_rewards import DefendShot, Goals
-from foosim.painting.overhead import OverheadPainter
+from foosim.rendering.cameras import Camera, Overview
 from foosim.simulation.env import TABLE, FoosimEnv, FoosimParallelEnv, Nothing, Reward, parallel_env
 
 __all__ = [
     "TABLE",
+    "Camera",
     "Column",
     "DefendShot",
     "FoosimEnv",
     "FoosimParallelEnv",
     "Goals",
     "Nothing",
-    "OverheadPainter",
+    "Overview",
     "Reward",
     "parallel_env",
 ]

@@ -7,10 +7,11 @@ network.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sin
+from math import sin, tan
 from typing import Final
 
 from foosim.rendering.pictures import Pictures, PictureSource, drawer_of
+from foosim.rendering.readings import drawn_world
 from foosim.world.component_types.payloads import PayloadCodec
 from foosim.world.components.cameras import DEFAULT_FOV, PictureSettings, towards
 from foosim.world.components.entities import mounting_of
@@ -19,7 +20,7 @@ from foosim.world.components.optics import Optics
 from foosim.world.components.sight import Sight, looks_of
 from foosim.world.components.view import View
 from foosim.world.layout import Layout
-from foosim.world.scene import Vector, moved
+from foosim.world.scene import Quaternion, Scene, Vector, drawn, enclosing, moved, shape_box, swept_box
 from foosim.world.spec import WorldSpec
 
 OVERVIEW: Final = "overview"
@@ -27,6 +28,12 @@ FROM: Final[Vector] = (-0.36, -0.48, 0.8)
 """The direction from the middle of the world to the eye of an overview, of length 1."""
 FAR: Final = 4.0
 """How far an overview sees, in diameters of the world."""
+ABOVE: Final = "view from above"
+FOV_ABOVE: Final = 0.6
+DOWN: Final[Quaternion] = (-0.5, 0.5, 0.5, 0.5)
+"""Looks straight down, with the world's x to the right and its y up."""
+GROUND_M: Final = 0.05
+"""Lower scenery is ground: it does not widen the view from above."""
 
 
 def cameras_of(spec: WorldSpec) -> dict[tuple[str, str], PictureSettings]:
@@ -71,17 +78,23 @@ class Camera:
 
 
 class Overview:
-    """The whole world, from a corner above it."""
+    """The whole world, from a corner above it, or from straight above all that stands."""
 
-    def __init__(self, spec: WorldSpec, layout: Layout, width: int, height: int) -> None:
+    def __init__(self, spec: WorldSpec, layout: Layout, width: int, height: int, *, is_above: bool = False) -> None:
         """Raises AssetError without a mesh of the world."""
-        narrow = DEFAULT_FOV * min(1.0, height / width)
-        middle, radius = drawer_of(spec, OVERVIEW).bounds
-        away = 0.8 * max(radius, 0.1) / sin(narrow / 2.0)
-        self._eye = moved(middle, FROM, away)
-        self._turned = towards(moved((0.0, 0.0, 0.0), FROM, -1.0))
-        optics = Optics(width, height, DEFAULT_FOV, 0.01 * away, FAR * away, samples=2)
-        self.pictures: Final = Pictures(spec, PictureSource(optics, ("image",), OVERVIEW), OVERVIEW, OVERVIEW)
+        if is_above:
+            name, fov, self._turned = ABOVE, FOV_ABOVE, DOWN
+            (low_x, low_y, low), (high_x, high_y, high) = _standing(drawn_world(spec, ABOVE).scene)
+            away = max(high_x - low_x, (high_y - low_y) * width / height, GROUND_M) / (2.0 * tan(fov / 2.0))
+            self._eye: Vector = ((low_x + high_x) / 2.0, (low_y + high_y) / 2.0, high + away)
+            away += high - low
+        else:
+            name, fov, self._turned = OVERVIEW, DEFAULT_FOV, towards(moved((0.0, 0.0, 0.0), FROM, -1.0))
+            middle, radius = drawer_of(spec, OVERVIEW).bounds
+            away = 0.8 * max(radius, 0.1) / sin(fov * min(1.0, height / width) / 2.0)
+            self._eye = moved(middle, FROM, away)
+        optics = Optics(width, height, fov, 0.01 * away, FAR * away, samples=2)
+        self.pictures: Final = Pictures(spec, PictureSource(optics, ("image",), name), name, name)
         self._in_view = InView(optics, looks_of(mounting_of(spec, layout, layout.entities[0])))
 
     def at(self, tick: int, numbers: Sequence[float]) -> Sight:
@@ -90,3 +103,11 @@ class Overview:
         sight = Sight(float(tick), *self._eye, *self._turned, tuple(links))
         sight.kept["drawn_by"] = self.pictures
         return sight
+
+
+def _standing(scene: Scene) -> tuple[Vector, Vector]:
+    """Return the box around all that stands: scenery above the ground, else bodies on fixed bases, else 10 m."""
+    boxes = [box for shape in drawn(scene.scenery) if (box := shape_box(shape))[1][2] > GROUND_M]
+    fixed = [body for body in scene.bodies.values() if not body.is_free and any(link.shapes for link in body.links)]
+    boxes = boxes or [swept_box(body) for body in fixed]
+    return enclosing(boxes or [((-5.0, -5.0, 0.0), (5.0, 5.0, 0.0))])

@@ -33,7 +33,7 @@ ORDER: list[set[str]] = [
     {"capture"},
     {"runtime"},
     {"protocol"},
-    {"deployment", "painting", "rendering"},
+    {"deployment", "rendering"},
     {"world"},
     {"common", "kernels"},
 ]

@@ -26,7 +26,6 @@ PACKAGES: Final = (
         "kernels",
         "launcher",
         "node",
-        "painting",
     ),
     *("protocol", "rendering", "runtime", "simulation", "supervisor", "vhub"),
 )

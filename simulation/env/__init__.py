@@ -56,7 +56,8 @@ class _Shown:
         return self._episodes.jobs(robot, actuator)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return the present frame from above, with `render_mode="rgb_array"`: uint8, (height, width, 3)."""
+        """Return the present frame, from above or by the camera, with `render_mode="rgb_array"`: uint8, (height, width,
+        3)."""
         return self._episodes.paint() if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
@@ -227,7 +228,8 @@ def parallel_env(deployment: Deployment | str | Path = TABLE, **arguments: Any) 
       an observation is a mapping: `readings` are the vector, and each picture is under `robot/channel.image`, `.depth`
       or `.segmentation`; all zeros before the first.
     * `sets`: changes of the file's values, as `--set` makes them.
-    * `pixels`: width and height of what `render` returns (320, 180).
+    * `pixels`: width and height of what `render` returns (320, 180), the world from straight above; or
+      `camera`: the camera, `robot/channel`, whose pictures it returns.
     * `render_mode`: `rgb_array`, or None.
 
     Raises DeploymentError, AssetError, UnknownName, BadValue and PlayerError for invalid arguments.

@@ -17,7 +17,7 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.common.limits import COUNTER_MAX
 from foosim.deployment.schema import Deployment
-from foosim.painting.overhead import OverheadPainter
+from foosim.rendering.cameras import Camera, Overview, cameras_of
 from foosim.simulation.agents import Agent
 from foosim.simulation.env.looks import Looks, Observation
 from foosim.simulation.simulation import Simulation, read_for_stepping
@@ -106,7 +106,8 @@ class Episodes:
         ages: bool = False,
         pictures: Sequence[str] = (),
         sets: Sequence[str] = (),
-        pixels: tuple[int, int] = PIXELS,
+        pixels: tuple[int, int] | None = None,
+        camera: str | None = None,
     ) -> None:
         """Raises DeploymentError, UnknownName and BadValue for invalid arguments; see `parallel_env`."""
         if not isinstance(deployment, Deployment):
@@ -117,8 +118,14 @@ class Episodes:
             raise BadValue("an environment has one agent or more", list(agents))
         if seconds is not None and not seconds > 0.0:
             raise BadValue("seconds of an episode are more than 0", seconds)
-        if not all(0 < side <= PIXELS_MAX for side in pixels):
+        if pixels is not None and camera is not None:
+            raise BadValue("a camera has its own pixels: an environment takes camera or pixels", str(pixels))
+        if not all(0 < side <= PIXELS_MAX for side in pixels or PIXELS):
             raise BadValue(f"pixels are a width and a height, each of 1 to {PIXELS_MAX}", str(pixels))
+        names = {f"{robot}/{channel}": its for (robot, channel), its in cameras_of(deployment).items()}
+        valid = [name for name, its in names.items() if "image" in its.pictures]
+        if camera is not None and camera not in valid:
+            raise UnknownName("no camera with images", camera, valid)
         self.ticks = _ticks(rate_hz, deployment.tick_ns)
         self.rate_hz = rate_hz
         self._start = read_branch(start, deployment).start if isinstance(start, str) else start
@@ -145,8 +152,8 @@ class Episodes:
         """By (robot, actuator) with jobs: the agent that gives them, and the jobs."""
         self._seed: int | None = None
         self._episode = self._steps = 0
-        self._pixels = pixels
-        self._painter: OverheadPainter | None = None
+        self._pixels, self._camera = pixels or PIXELS, camera
+        self._eye: Camera | Overview | None = None
         self.is_running = False
 
     def columns(self, agent: str) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
@@ -263,11 +270,22 @@ class Episodes:
         return [name for name, agent in self.simulation.agents.items() if agent.exists]
 
     def paint(self) -> NDArray[np.uint8]:
-        """Return the present frame from above, an array of uint8 of the shape (height, width, 3)."""
-        simulation = self.simulation
-        if self._painter is None:
-            self._painter = OverheadPainter(simulation.scene, simulation.frame.layout, self._pixels)
-        return self._painter.paint(simulation.frame)
+        """Return the present frame from above or by the camera, an array of uint8 of the shape (height, width, 3).
+
+        It is black while the camera's robot is absent.
+        """
+        simulation, frame = self.simulation, self.simulation.frame
+        if self._eye is None:
+            spec, layout = simulation.deployment, frame.layout
+            robot, _, channel = (self._camera or "").partition("/")
+            above = self._camera is None
+            self._eye = (
+                Overview(spec, layout, *self._pixels, is_above=True) if above else Camera(spec, layout, robot, channel)
+            )
+        sight = self._eye.at(frame.tick, frame.numbers)
+        if sight is None:
+            return np.zeros(self._eye.pictures.shapes()["image"].shape, np.uint8)
+        return sight.image()
 
     def close(self) -> None:
         """Free the engines."""

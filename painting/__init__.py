@@ -1,1 +1,0 @@
-"""Pictures of the world, made with numpy alone."""
