@@ -599,6 +599,7 @@ def connect(
         raise BadValue("not a name for a client", name)
     if address.startswith(RUN):
         address = _address_of(address.removeprefix(RUN))
+    from foosim.runtime.file_cache import FileCache
     from foosim.runtime.transport.certificates import load_credentials
     from foosim.runtime.transport.session import ConnectError, Session
     from foosim.runtime.transport.settings import Security
@@ -611,7 +612,7 @@ def connect(
     except ConnectError as error:
         raise ConnectionFailed(error.what) from None
     try:
-        core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
+        core = ClientCore(name, new_boot(), time.monotonic_ns(), world, FileCache())
         link = Link(core, session)
         left_s = timeout_s - (time.monotonic_ns() - begun_ns) / NS_PER_S
         link.wait(lambda: core.deployment is not None or bool(core.refusal), left_s)

@@ -127,7 +127,7 @@ class Control:
 
         Raises NoAnswer after `timeout_s` without a piece of a file.
         """
-        fetching = Fetching(deployment, {})
+        fetching = Fetching(deployment.files(), {})
         while (lacking := fetching.lacking) is not None:
             digest, offset = lacking
             payload = encode(Fetch(self._name, self._name, bytes.fromhex(digest), offset))

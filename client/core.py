@@ -10,13 +10,14 @@ restarts with hello and resumes at its numbers.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from msgspec import structs
 
 from foosim.client.errors import PacketError
+from foosim.client.files import ClientFiles, are_drawn
 from foosim.client.packets import check_packet, check_subscription, split
 from foosim.client.player import Packet
 from foosim.common import limits
@@ -37,6 +38,7 @@ from foosim.protocol.messages import (
     Go,
     Heard,
     Join,
+    Piece,
     Received,
     Sent,
     Subscription,
@@ -75,8 +77,10 @@ class ClientStatistics:
 class ClientCore:
     """One client's state machine. `actions` are the shell's next steps."""
 
-    def __init__(self, name: str, boot: str, now_ns: int, world: str = "") -> None:
-        """`world` is empty when the client accepts any world."""
+    def __init__(
+        self, name: str, boot: str, now_ns: int, world: str = "", cache: MutableMapping[str, bytes] | None = None
+    ) -> None:
+        """`world` is empty when the client accepts any world. `cache` keeps fetched files, by digest."""
         self.name = name
         self.boot = boot
         self.actions: list[Action] = []
@@ -99,10 +103,12 @@ class ClientCore:
         self.lost = False
         """Whether it was gone for longer than a run waits for it."""
         self._world = world
-        self._now_ns = now_ns
-        self._again_ns = now_ns
+        self._now_ns = self._again_ns = now_ns
         self._again_after_ns = AGAIN_NS
         self._join: Join | None = None
+        self._cache = {} if cache is None else cache
+        self._files: ClientFiles | None = None
+        """While files are fetched, before the Join."""
         self._lost_ns = NEVER_NS
         self._gone = 0
         """Number of losses of the vHub. An answer to a hello from before the last one is ignored."""
@@ -121,6 +127,7 @@ class ClientCore:
         self._readers: dict[type[Any], Callable[[Any], None]] = {
             ClientWelcome: self._on_welcome,
             ClientRefusal: self._on_refusal,
+            Piece: self._on_piece,
             Go: self._on_go,
             Down: self._on_down,
             Heard: self._on_heard,
@@ -228,6 +235,9 @@ class ClientCore:
         assert all(item in items for item in calling), (calling, items)
         self._join = Join(self.name, self.boot, period_ticks, items, offset_ticks, calling)
         self._period, self._offset, self._on_arrival = period_ticks, offset_ticks, bool(calling)
+        self._files = None
+        if are_drawn(self.deployment, pairs) and not self.deployment.fetched:
+            self._files = ClientFiles(self.name, self.boot, self.deployment, self._cache, self.actions)
         if not self.is_away:
             self._say_join()
         self._again_after_ns = AGAIN_NS
@@ -325,6 +335,14 @@ class ClientCore:
     def _refused(self, reason: str) -> None:
         self.refusal = reason or "no reason given"
         self.actions.append(Log("error", f"refused by the vHub: {self.refusal}"))
+
+    def _on_piece(self, piece: Piece) -> None:
+        if self._files is None or not self._files.take(piece):
+            self._repeated += 1
+            return
+        self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
+        if not self.is_away:
+            self._say_join()
 
     def _is_for_me(self, message: ClientWelcome | ClientRefusal) -> bool:
         if message.name != self.name:
@@ -444,6 +462,11 @@ class ClientCore:
 
     def _say_join(self) -> None:
         assert self._join is not None and self.welcome is not None
+        if self._files is not None and not self._files.is_over:
+            self._files.request()
+            if not self._files.is_over:
+                return
+        self._files = None
         self._publish(encode(structs.replace(self._join, hub=self.welcome.hub)))
 
     def _count_sent(self, sent: Sequence[Sent]) -> None:

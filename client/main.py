@@ -24,6 +24,7 @@ from foosim.protocol import channels, identity
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import VHUB, Plane
 from foosim.runtime.command import DONE, FAILED, REFUSED, PathOption, PkiOption, new_app
+from foosim.runtime.file_cache import FileCache
 from foosim.runtime.health import ProgressOption
 from foosim.runtime.process import Stop, die_with_parent, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell, client_session
@@ -37,7 +38,7 @@ class PlayerShell:
     def __init__(
         self, process: Process, name: str, session: Session, world: str = "", credentials: Credentials | None = None
     ) -> None:
-        self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world)
+        self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world, FileCache())
         self._player = PlayerLoop(self.core, load_player)
         self._failure: PlayerError | None = None
         self._is_present = self._is_stopped = False

@@ -58,6 +58,10 @@ ASSETS_BYTES_MAX: Final = 64 * 1024 * 1024
 """All files that a deployment refers to."""
 ASSET_PIECE_BYTES: Final = 1024 * 1024
 """The piece of such a file in one message."""
+RADIO_PIECE_BYTES: Final = 256 * 1024
+"""That in a message to a client."""
+FETCHED_BYTES_PER_S: Final = 4 * 1024 * 1024
+"""What a client may fetch steadily, beside twice ASSETS_BYTES_MAX at once."""
 MESH_TRIANGLES_MAX: Final = 200_000
 VISUAL_BYTES_MAX: Final = 64 * 1024 * 1024
 """A file of a mesh that is only drawn: it becomes a small one before it is part of a deployment."""

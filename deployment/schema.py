@@ -23,6 +23,7 @@ from foosim.deployment.network.link_settings import Profiles
 from foosim.deployment.network.rules import Network, Selector
 from foosim.deployment.network.traces import check_files, network_files
 from foosim.world.assembly.joint_selection import with_joint_names
+from foosim.world.bodies.visual_meshes import undrawn_path
 from foosim.world.scenery import mesh_files, read_contents
 from foosim.world.spec import WorldSpec
 
@@ -185,23 +186,30 @@ class Deployment(WorldSpec):
     access: AccessSpec = Field(default_factory=AccessSpec)
     deadlines: Deadlines = Field(default_factory=Deadlines)
 
-    def with_assets(self, files: Mapping[str, bytes]) -> Self:
+    def with_assets(self, files: Mapping[str, bytes], *, drawn: bool = True) -> Self:
         """The same with the contents of the files that scenery, robots and network name, and with the names of joints
-        in the settings that select some. Raises AssetError."""
+        in the settings that select some. What is only `drawn` may be left out. Raises AssetError."""
         others = [*network_files(self.network), *self.robot_files(files)]
         deployment = self.with_contents(read_contents(self.scenery, files, others))
         check_files(self.network, files)
-        self.check_robot_files(files)
+        self.check_robot_files(files, drawn=drawn)
         return deployment.with_joint_names()
 
     def with_joint_names(self) -> Self:
         """The same with the names of joints in the settings that select some; the files of robots must be there."""
         return with_joint_names(self)
 
-    def files(self) -> dict[str, str | None]:
-        """The files that it names, by path, each with the digest that is written beside it."""
+    def files(self, *, drawn: bool = True) -> dict[str, str | None]:
+        """The files that it names, by path, each with the digest that is written beside it: with what is only drawn, or
+        without."""
         named: dict[str, str | None] = dict.fromkeys(self.robot_files({}))
-        return named | self.digests | mesh_files(self.scenery) | network_files(self.network)
+        digests = {path: digest for path, digest in self.digests.items() if drawn or not undrawn_path(path)}
+        return named | digests | mesh_files(self.scenery) | network_files(self.network)
+
+    def world_files(self) -> dict[str, str]:
+        """The files that its world is drawn with, digests by path."""
+        named = self.digests | mesh_files(self.scenery)
+        return {path: digest for path, digest in named.items() if digest is not None}
 
     def wanted(self, files: Mapping[str, bytes]) -> list[str]:
         """Return the needed files that `files` lacks, as far as known: one may name further ones."""

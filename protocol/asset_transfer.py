@@ -1,4 +1,4 @@
-"""Transfers the files that a deployment refers to, as part of the handshake.
+"""Transfers the files that a deployment refers to, as part of a handshake.
 
 The deployment's text names each file by its digest. A process requests a missing file piece by piece, each as soon as
 the one before has arrived, and again after a while; so one piece is in flight at a time, and the sender keeps no state.
@@ -17,12 +17,12 @@ from foosim.world.matter.mesh import digest_of
 
 
 class Fetching:
-    """The files that one build needs, and the progress of their transfer."""
+    """The files that a process needs, and the progress of their transfer."""
 
-    def __init__(self, deployment: Deployment, files: Mapping[str, bytes]) -> None:
-        """`files` are those of earlier builds, by digest. Raises Malformed for a file without a digest."""
+    def __init__(self, needed: Mapping[str, str | None], files: Mapping[str, bytes]) -> None:
+        """`needed` are digests by path, `files` known contents by digest. Raises Malformed without a digest."""
         self._digests: dict[str, str] = {}
-        for path, digest in deployment.files().items():
+        for path, digest in needed.items():
             if digest is None:
                 raise Malformed(f"a build whose file {path} has no digest")
             self._digests[path] = digest
@@ -58,12 +58,15 @@ class Fetching:
         return {path: self.files[digest] for path, digest in self._digests.items()}
 
 
-def piece_of(deployment: Deployment, fetch: Fetch) -> Piece:
-    """Return the requested piece of a deployment's files; raises Malformed when there is none."""
+def piece_of(deployment: Deployment, fetch: Fetch, most: int | None = None) -> Piece:
+    """Return the requested piece of a deployment's files, of at most `most` bytes, by default as many as a piece has.
+
+    Raises Malformed when there is none.
+    """
     content = deployment.file_with(fetch.digest.hex())
     if content is None:
         raise Malformed(f"a fetch of a file that the deployment does not have, {fetch.digest.hex()[:16]}")
     if fetch.offset > len(content):
         raise Malformed(f"a fetch from byte {fetch.offset} of a file of {len(content)}")
-    piece = content[fetch.offset : fetch.offset + limits.ASSET_PIECE_BYTES]
+    piece = content[fetch.offset : fetch.offset + (most or limits.ASSET_PIECE_BYTES)]
     return Piece(fetch.name, fetch.boot, fetch.digest, fetch.offset, len(content), piece)

@@ -73,9 +73,10 @@ def _radio(
     readers: str,
     rate: str,
     bytes_max: int = limits.RADIO_MESSAGE_BYTES_MAX,
+    blocking: bool = True,
 ) -> Channel:
     key = f"foosim/radio/{name}/{{name}}"
-    return Channel(name, key, message, Plane.RADIO, writers, readers, rate, True, bytes_max)
+    return Channel(name, key, message, Plane.RADIO, writers, readers, rate, True, bytes_max, blocking)
 
 
 def _replay(
@@ -126,6 +127,8 @@ VIEW: Final = _simulation(
 CLIENT_HELLO: Final = _radio("hello", messages.ClientHello, "client", "vhub", "5 Hz until answered", bytes_max=_SMALL)
 CLIENT_WELCOME: Final = _radio("welcome", messages.ClientWelcome, "vhub", "the named one", "an answer")
 CLIENT_REFUSAL: Final = _radio("refusal", messages.ClientRefusal, "vhub", "the named one", "an answer")
+CLIENT_FETCH: Final = _radio("file_request", messages.Fetch, "client", "vhub", "a piece of a file", bytes_max=_SMALL)
+CLIENT_PIECE: Final = _radio("file_piece", messages.Piece, "vhub", "the named one", "an answer", blocking=False)
 _UPLINK: Final = messages.Join | messages.Up | messages.Done | messages.Failure
 UP: Final = _radio("up", _UPLINK, "client", "vhub", "the client's rate")
 DOWN: Final = _radio("down", messages.Go | messages.Down | messages.Heard, "vhub", "the named one", "the client's rate")
@@ -166,12 +169,12 @@ NODE_READS: Final[Reads] = (*((channel, True) for channel in (
 VHUB_READS: Final[Reads] = (*((channel, True) for channel in (
     BUILD, PIECE, REFUSAL, RESUME_GRANT, COMMIT
 )), *((channel, False) for channel in (
-    RECALL, EPOCH, SAMPLES, WANT, TEMPO, WATCHED, END, CLIENT_HELLO, UP
+    RECALL, EPOCH, SAMPLES, WANT, TEMPO, WATCHED, END, CLIENT_HELLO, CLIENT_FETCH, UP
 )))  # fmt: skip
 SUPERVISOR_READS: Final[Reads] = tuple((channel, False) for channel in (
     HELLO, FETCH, READY, RESUME_STATE, PART, DELIVERIES, WANT, HEARTBEAT, FAREWELL, REQUEST, INQUIRY
 ))  # fmt: skip
-CLIENT_READS: Final[Reads] = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (DOWN, True))
+CLIENT_READS: Final[Reads] = ((CLIENT_WELCOME, True), (CLIENT_REFUSAL, True), (CLIENT_PIECE, True), (DOWN, True))
 OPERATOR_READS: Final[Reads] = ((ANSWER, True), (PIECE, True))
 VIEW_READS: Final[Reads] = ((VIEW, False),)
 REPLAY_READS: Final[Reads] = ((REPLAY_REQUEST, False),)

@@ -137,13 +137,13 @@ class Member:
             raise self._invalid(build, f"its machine cannot compute the run: {lack}")
         if not deployment.lacks_files:  # else when they have come
             build_layout(deployment)
-        self._coming = build, deployment, Fetching(deployment, self._files)
+        self._coming = build, deployment, Fetching(deployment.files(drawn=self._draws(deployment)), self._files)
         self.deadline_ns = 0
 
     def _end_build(self, build: Build, deployment: Deployment, fetching: Fetching) -> None:
         self._coming, self._files = None, fetching.files
         try:
-            deployment = deployment.with_assets(fetching.contents())
+            deployment = deployment.with_assets(fetching.contents(), drawn=self._draws(deployment))
         except AssetError as error:
             raise self._invalid(build, f"a file of the deployment is not valid on its machine: {error}") from None
         self.deployment, self.layout = deployment, build_layout(deployment)
@@ -151,6 +151,10 @@ class Member:
         self.problem = ""
         self.deadline_ns = 0  # the first heartbeat follows at once: the vHub's carries the address of the radio plane
         self._world = deployment.world
+
+    def _draws(self, deployment: Deployment) -> bool:
+        """Whether this process needs what robots look like: a node does for the view of cameras alone."""
+        return self.role != "node" or deployment.has_drawn_readings
 
     def _invalid(self, build: Build, what: str) -> NotValidHere:
         self._not_valid = build.deployment

@@ -278,7 +278,8 @@ class Answer(Message, frozen=True):
 
 
 class Fetch(Message, frozen=True):
-    """A process that builds the world requests the file with this digest, from the byte at `offset` on."""
+    """A process that builds the world, or a client that hears a camera, requests the file with this digest, from the
+    byte at `offset` on."""
 
     name: Name
     boot: Name

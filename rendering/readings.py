@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,6 @@ from foosim.world.matter.mesh import AssetError
 from foosim.world.scene import Scene
 from foosim.world.scenery import read_contents
 from foosim.world.spec import WorldSpec
-
-FETCHED: Final = "fetched files"
-"""Shared by a world that was read without its files: their contents by path."""
 
 
 class Links(NamedTuple):
@@ -55,8 +52,7 @@ def drawn_world(spec: WorldSpec, what: str) -> DrawnWorld:
 
 
 def _built(spec: WorldSpec, what: str) -> DrawnWorld:
-    fetched = spec.shared(FETCHED, dict)
-    assert isinstance(fetched, dict)
+    fetched = spec.fetched
     try:
         if fetched:
             spec = spec.with_contents(read_contents(spec.scenery, fetched, spec.robot_files(fetched)))

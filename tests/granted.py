@@ -32,7 +32,7 @@ def may_put(identity: str, key: str) -> bool:
         case "viewer":
             return key.rpartition("/")[0] in {f"{S}/inquiry", f"{S}/fetch"} and is_end_of(key, name)
         case "client":
-            return key in {f"{R}/hello/{name}", f"{R}/up/{name}"}
+            return key in {f"{R}/{what}/{name}" for what in ("hello", "file_request", "up")}
     return False
 
 
@@ -56,7 +56,7 @@ def may_hear(identity: str, key: str) -> bool:
             addressed = key.rpartition("/")[0] in {f"{S}/answer", f"{S}/piece"} and is_end_of(key, name)
             return addressed or key == f"{S}/view"
         case "client":
-            return key in {f"{R}/{what}/{name}" for what in ("welcome", "refusal", "down")}
+            return key in {f"{R}/{what}/{name}" for what in ("welcome", "refusal", "file_piece", "down")}
     return False
 
 

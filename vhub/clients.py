@@ -14,9 +14,11 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.units import parse_pace
 from foosim.deployment.schema import Deployment
-from foosim.protocol.actions import Action, Journal
+from foosim.protocol import channels
+from foosim.protocol.actions import Action, Journal, Publish
+from foosim.protocol.asset_transfer import piece_of
 from foosim.protocol.codec import encode
-from foosim.protocol.messages import Build, ClientHello, Done, Failure, Go, Join, Tempo, Up
+from foosim.protocol.messages import Build, ClientHello, Done, Failure, Fetch, Go, Join, Tempo, Up
 from foosim.runtime.roles.standstill import REPORTED_NS
 from foosim.vhub.absences import Absences
 from foosim.vhub.network.memory import Joining
@@ -167,6 +169,16 @@ class Clients:
             return False
         self._sessions.join(join)
         return True
+
+    def on_fetch(self, fetch: Fetch, payload: bytes, now_ns: int) -> None:
+        """Send a client a piece of a file of the world, within what it may fetch. Raises Malformed for no such file."""
+        session = self._sessions.by_name.get(fetch.name)
+        if session is None or fetch.boot not in session.claims or self._deployment is None:
+            self.repeated += 1
+            return
+        if session.may_fetch(now_ns):
+            piece = piece_of(self._deployment, fetch, limits.RADIO_PIECE_BYTES)
+            self._actions.append(Publish(channels.CLIENT_PIECE, fetch.name, encode(piece)))
 
     def on_up(self, up: Up, payload: bytes, now_ns: int) -> None:
         """Take packets of a free-running client."""

@@ -124,9 +124,21 @@ class Session:
     deadline: str = ""
     """The name of the deadline in the deployment."""
     done: Done | None = None
+    fetched_bytes: int = 0
+    """What it has fetched, less what it may fetch since."""
+    fetched_ns: int = 0
     inbox: list[Sent] = field(default_factory=list)
     inbox_bytes: int = 0
     """Size of the messages as received."""
+
+    def may_fetch(self, now_ns: int) -> bool:
+        """Count a piece of a file; return False beyond what a client may fetch."""
+        again = (now_ns - self.fetched_ns) * limits.FETCHED_BYTES_PER_S // 1_000_000_000
+        self.fetched_bytes, self.fetched_ns = max(0, self.fetched_bytes - again), now_ns
+        if self.fetched_bytes >= 2 * limits.ASSETS_BYTES_MAX:
+            return False
+        self.fetched_bytes += limits.RADIO_PIECE_BYTES
+        return True
 
     def is_late(self, hello: ClientHello) -> bool:
         """Whether the process of a hello has ended since: a process that reconnects has a higher number of returns."""

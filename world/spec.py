@@ -11,6 +11,7 @@ from pydantic import Field, PrivateAttr, SerializeAsAny
 from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
+from foosim.world.bodies.visual_meshes import undrawn_path
 from foosim.world.component_types import registry
 from foosim.world.component_types.descriptions import Engine, Kit, Model
 from foosim.world.component_types.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
@@ -196,9 +197,27 @@ class WorldSpec(SpecBase):
             )
         return sorted(found)
 
-    def check_robot_files(self, files: Mapping[str, bytes]) -> None:
-        """Raise AssetError for a file of a robot that is missing, has another digest or is invalid."""
+    @property
+    def has_drawn_readings(self) -> bool:
+        """Whether readings of a sensor are drawn where they are looked at."""
+        return any(one.component_type.drawn_by for robot in self.robots.values() for one in robot.sensors.values())
+
+    @property
+    def fetched(self) -> dict[str, bytes]:
+        """The contents of files, by path, that came after the world was read without them: pictures are drawn with
+        them."""
+        found = self.shared("fetched", dict)
+        assert isinstance(found, dict)
+        return found
+
+    def check_robot_files(self, files: Mapping[str, bytes], *, drawn: bool = True) -> None:
+        """Raise AssetError for a file of a robot that is missing, has another digest or is invalid.
+
+        What is only `drawn` may be left out.
+        """
         for path in self.robot_files(files):
+            if not drawn and undrawn_path(path):
+                continue
             if path not in files:
                 raise AssetError(f"{path}: the file of a robot is missing")
             if path in self.digests:

@@ -54,11 +54,11 @@ def test_planes_share_no_key_and_keys_are_valid() -> None:
         assert all(chunk and chunk.strip() == chunk and "*" not in chunk and "$" not in chunk for chunk in chunks)
         assert channel.key_for("red") == channel.key.replace("{name}", "red")
         assert channel.express, "small messages of a tick wait for nothing"
-        assert channel.blocking is (channel.name != "view"), "only what people look at may be lost"
+        assert channel.blocking is (channel.name not in {"view", "file_piece"}), "what is not requested again blocks"
 
 
 def test_size_limits_are_those_of_the_planes() -> None:
-    small = {"hello", "ready", "want", "request", "inquiry"}
+    small = {"hello", "ready", "want", "request", "inquiry", "file_request"}
     for channel in CHANNELS:
         largest = limits.RADIO_MESSAGE_BYTES_MAX if channel.plane is Plane.RADIO else limits.MESSAGE_BYTES_MAX
         assert channel.bytes_max == (limits.SMALL_MESSAGE_BYTES_MAX if channel.name in small else largest), channel.name

@@ -48,7 +48,7 @@ def fetch_of(fetching: Fetching) -> Fetch:
 
 
 def test_a_file_comes_piece_by_piece(pinned: str) -> None:
-    fetching = Fetching(load_deployment(pinned, "t"), {})
+    fetching = Fetching(load_deployment(pinned, "t").files(), {})
     asked = []
     while fetching.lacking is not None:
         fetch = fetch_of(fetching)
@@ -58,11 +58,12 @@ def test_a_file_comes_piece_by_piece(pinned: str) -> None:
         assert fetching.take(piece)
         assert not fetching.take(piece), "a repeat"
     assert asked == [0, 20, 40, 0, 20, 40] and fetching.contents() == FILES
-    assert Fetching(load_deployment(pinned, "t"), fetching.files).lacking is None, "what is here is not asked for again"
+    needed = load_deployment(pinned, "t").files()
+    assert Fetching(needed, fetching.files).lacking is None, "what is here is not asked for again"
 
 
 def test_a_piece_that_cannot_be_what_it_says_is_refused(pinned: str) -> None:
-    fetching = Fetching(load_deployment(pinned, "t"), {})
+    fetching = Fetching(load_deployment(pinned, "t").files(), {})
     true = piece_of(whole(pinned), fetch_of(fetching))
     other = blake2b(b"", digest_size=32).digest()
     for piece in (replace(true, offset=1), replace(true, digest=other)):
@@ -74,11 +75,11 @@ def test_a_piece_that_cannot_be_what_it_says_is_refused(pinned: str) -> None:
         fetching.take(replace(true, size=20))
     assert fetching.lacking == (true.digest.hex(), 0), "from the beginning"
     with pytest.raises(Malformed, match="has no digest"):
-        Fetching(load_deployment(apply_sets(TABLE.read_text(), "t", [f"scenery={{{THINGS}}}"]), "t"), {})
+        Fetching(load_deployment(apply_sets(TABLE.read_text(), "t", [f"scenery={{{THINGS}}}"]), "t").files(), {})
 
 
 def test_a_fetch_of_what_is_not_there_is_refused(pinned: str) -> None:
-    fetch = fetch_of(Fetching(load_deployment(pinned, "t"), {}))
+    fetch = fetch_of(Fetching(load_deployment(pinned, "t").files(), {}))
     assert piece_of(whole(pinned), replace(fetch, offset=len(SHARD))).content == b""
     for bad in (replace(fetch, offset=len(SHARD) + 1), replace(fetch, digest=bytes(32))):
         with pytest.raises(Malformed, match="a fetch"):

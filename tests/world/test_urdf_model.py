@@ -77,7 +77,7 @@ def test_the_files_of_robots_and_their_meshes_are_pinned_and_travel(folder: Path
     assert files == FILES
     there = load_deployment(text, NAME)
     assert there.lacks_files and there.files() == {path: digest_of(content) for path, content in FILES.items()}
-    fetching = Fetching(there, {digest_of(content): content for content in FILES.values()})
+    fetching = Fetching(there.files(), {digest_of(content): content for content in FILES.values()})
     complete = there.with_assets(fetching.contents())
     assert not complete.lacks_files and complete.asset_files == FILES, "what a capture attaches"
     assert pin_assets(text, NAME, folder) == (text, files), "pinning twice changes nothing"
