@@ -337,14 +337,14 @@ class ClientCore:
         self.actions.append(Log("error", f"refused by the vHub: {self.refusal}"))
 
     def _on_piece(self, piece: Piece) -> None:
-        if self._files is None or not self._files.take(piece):
+        if not self._is_for_me(piece) or self._files is None or not self._files.take(piece):
             self._repeated += 1
             return
         self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         if not self.is_away:
             self._say_join()
 
-    def _is_for_me(self, message: ClientWelcome | ClientRefusal) -> bool:
+    def _is_for_me(self, message: ClientWelcome | ClientRefusal | Piece) -> bool:
         if message.name != self.name:
             raise Malformed(f"a message on the key of {self.name} names {message.name}")
         return message.boot == self.boot

@@ -31,7 +31,7 @@ def are_drawn(deployment: Deployment, pairs: Iterable[tuple[str, str]]) -> bool:
 
 
 class ClientFiles:
-    """The transfer to one client. `cache` has contents by digest and keeps those that have come."""
+    """The transfer to one client. `cache` has contents by digest and keeps received ones."""
 
     def __init__(
         self, name: str, boot: str, deployment: Deployment, cache: MutableMapping[str, bytes], actions: list[Action]
@@ -60,7 +60,7 @@ class ClientFiles:
 
     def take(self, piece: Piece) -> bool:
         """Take a piece; return whether it is the requested one. Raises Malformed for one that cannot be."""
-        if piece.boot != self._boot or self.is_over:
+        if self.is_over:
             return False
         try:
             if not self._fetching.take(piece):

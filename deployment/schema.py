@@ -192,7 +192,7 @@ class Deployment(WorldSpec):
         others = [*network_files(self.network), *self.robot_files(files)]
         deployment = self.with_contents(read_contents(self.scenery, files, others))
         check_files(self.network, files)
-        self.check_robot_files(files, drawn=drawn)
+        self.check_robot_files(files, () if drawn else [path for path in self.digests if undrawn_path(path)])
         return deployment.with_joint_names()
 
     def with_joint_names(self) -> Self:

@@ -81,6 +81,7 @@ SHELLS = {
     "runtime/transport/certificates.py",
     "runtime/command.py",
     "runtime/disk.py",
+    "runtime/file_cache.py",
     "runtime/transport/inbox.py",
     "runtime/journal.py",
     "runtime/roles/loop.py",

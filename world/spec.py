@@ -1,6 +1,6 @@
 """The world part of a deployment: the computed entities, without machines and network."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from fractions import Fraction
 from functools import cached_property
 from math import gcd
@@ -11,7 +11,6 @@ from pydantic import Field, PrivateAttr, SerializeAsAny
 from foosim.common import limits, units
 from foosim.common.spec_base import Name, RobotName, SpecBase
 from foosim.common.units import Quantity, period_ticks
-from foosim.world.bodies.visual_meshes import undrawn_path
 from foosim.world.component_types import registry
 from foosim.world.component_types.descriptions import Engine, Kit, Model
 from foosim.world.component_types.settings import EntitySettings, RobotSettings, RuleSettings, SceneSettings
@@ -210,15 +209,15 @@ class WorldSpec(SpecBase):
         assert isinstance(found, dict)
         return found
 
-    def check_robot_files(self, files: Mapping[str, bytes], *, drawn: bool = True) -> None:
+    def check_robot_files(self, files: Mapping[str, bytes], optional: Collection[str] = ()) -> None:
         """Raise AssetError for a file of a robot that is missing, has another digest or is invalid.
 
-        What is only `drawn` may be left out.
+        `optional` files may be missing.
         """
         for path in self.robot_files(files):
-            if not drawn and undrawn_path(path):
-                continue
             if path not in files:
+                if path in optional:
+                    continue
                 raise AssetError(f"{path}: the file of a robot is missing")
             if path in self.digests:
                 check_digest(path, files[path], self.digests[path])
