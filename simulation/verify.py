@@ -7,7 +7,7 @@ only on request, of a cut. Frames between the captured ones are computed in the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -131,6 +131,24 @@ def captured_world(about: About, deployment: Deployment, frame: Frame, nodes: in
         raise CaptureError(f"the run cannot be computed again here: {lack}")
     check_shapes(deployment, about.deployment_name, about.deployment_text)
     return SteppedWorld(deployment, frame, deal_robots(deployment, nodes))
+
+
+def simulated_again(capture: CaptureData) -> Iterator[Frame]:
+    """Yield the frames of a capture from the first captured one on, computed again. Raises CaptureError."""
+    first = capture.first_frame()
+    if first is None:
+        raise CaptureError(f"{capture.path}: no captured frame")
+    world = captured_world(capture.about, capture.deployment, first)
+    try:
+        for captured in capture.captured_ticks():
+            if captured.tick < first.tick:
+                continue
+            frame = frame_of(world, captured)
+            if frame.digest != captured.digest:
+                raise CaptureError(f"{capture.path}: tick {captured.tick} computed again differs from the captured one")
+            yield frame
+    finally:
+        world.close()
 
 
 def frame_of(world: SteppedWorld, captured: CapturedTick) -> Frame:

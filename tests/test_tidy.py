@@ -102,6 +102,7 @@ SHELLS = {
     "capture/diff.py",
     "capture/export.py",
     "capture/new_file.py",
+    "capture/pictures.py",
     "analysis/picture.py",
     "simulation/play/main.py",
     "cli/capture/play.py",

@@ -15,29 +15,59 @@ import typer
 from foosim.capture.cut import cut_capture
 from foosim.capture.diff import Diff, Difference, diff_captures
 from foosim.capture.export import STANDARD_OUTPUT, Format, export_capture
+from foosim.capture.pictures import export_pictures
 from foosim.capture.tables import table_names
 from foosim.cli.capture.options import Capture, reading, time_of
-from foosim.common.errors import UnknownName
+from foosim.common.errors import BadValue, UnknownName
 from foosim.runtime.command import DONE, FAILED, JsonOption, print_json
+from foosim.simulation.verify import simulated_again
 
 _TABLES = ", ".join(table_names())
 
 
-def export(
+def export(  # noqa: PLR0913, PLR0917  # a command's options
     capture: Capture,
     out: Annotated[Path, typer.Option("--out", "-o", help="The file to write; - is standard output.")],
     what: Annotated[str, typer.Option(help=f"The table: {_TABLES}.")] = "packets",
     form: Annotated[
         str | None, typer.Option("--format", help="csv or parquet; by default from the file's suffix, csv for -.")
     ] = None,
+    images: Annotated[
+        str | None, typer.Option(help="Write pictures of cameras instead: png (a new folder) or mcap (for viewers).")
+    ] = None,
+    video: Annotated[bool, typer.Option("--video", help="Write a video of one camera, by ffmpeg.")] = False,
+    camera: Annotated[
+        list[str] | None,
+        typer.Option(help="ROBOT/CHANNEL of cameras, with * and ?; overview: the whole world. May be repeated."),
+    ] = None,
+    begin: Annotated[str | None, typer.Option("--from", help="Time of the first picture, e.g. 10s.")] = None,
+    end: Annotated[str | None, typer.Option("--to", help="Time of the last picture, e.g. 20s.")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a table of a capture as CSV or Parquet.
+    """Write a table of a capture as CSV or Parquet, or pictures of its cameras.
 
     `packets` has a row per offered packet, `commands` a row per decoded command to a robot, `poses` a row per link and
     captured pose; the other tables have the capture's rows of that name. Times are simulated time in integer ns.
     Parquet needs pyarrow: pip install 'foosim[parquet]'. An existing file is not overwritten.
+
+    Pictures are those of captured packets. A camera without packets is drawn at its ticks, from captured frames or by
+    simulating again. Depth is in mm (png) or m (mcap); segmentation has numbers of things. A video of `overview` has
+    the captured frames.
     """
+    if images is not None or video:
+        if images is not None and video:
+            raise BadValue("--images and --video are two exports", images)
+        span = time_of("--from", begin) or 0, time_of("--to", end)
+        form_of = "video" if video else str(images)
+        with reading():
+            count = export_pictures(capture, out, form_of, camera or ["*"], span, simulated_again)
+        if json:
+            print_json({"path": str(out), "pictures": count})
+        else:
+            typer.echo(f"{out}: {count} pictures")
+        return
+    if camera or begin or end:
+        raise BadValue("--camera, --from and --to are of --images and --video", camera or begin or end)
     with reading():
         done = export_capture(capture, what, out, _format(form))
     if json:
