@@ -239,7 +239,7 @@ def _overview(capture: CaptureData, out: Path, span_ns: tuple[int, int | None]) 
 def _video(out: Path, frames: Iterable[NDArray[np.uint8]], width: int, height: int, rate_hz: float) -> int:
     program = shutil.which("ffmpeg")
     if program is None:
-        raise Failed("a video needs the program ffmpeg, which is not on PATH; --images png needs none")
+        raise Failed("a video needs ffmpeg: no such program on PATH; --images png needs none")
     given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{rate_hz:.6f}", "-i", "-"]
     even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
     count = 0

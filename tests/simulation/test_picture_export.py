@@ -99,7 +99,7 @@ def test_what_cannot_be_exported_is_refused(
         with pytest.raises(BadValue, match=problem):
             export_pictures(capture.path, tmp_path / "out.mp4", form, cameras, ALL, simulated_again)
     for camera in ("camera/eye", "overview"):
-        with pytest.raises(Failed, match="needs the program ffmpeg"):
+        with pytest.raises(Failed, match="a video needs ffmpeg: no such program"):
             export_pictures(capture.path, tmp_path / "out.mp4", "video", [camera], ALL, simulated_again)
     (tmp_path / "ffmpeg").write_text('#!/bin/sh\nfor last; do :; done\n/bin/cat > "$last"\n')
     (tmp_path / "ffmpeg").chmod(0o755)
