@@ -10,6 +10,7 @@ from base64 import b64decode
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, replace
+from functools import partial
 from typing import Any, Final
 
 from foosim.common.errors import BadValue, Malformed
@@ -17,7 +18,7 @@ from foosim.console.live.history import History
 from foosim.console.live.watched import WatchList
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.links import Links
-from foosim.console.shown.source import About, Curve, Moment, Wanted
+from foosim.console.shown.source import About, Curve, Eyes, Moment, Wanted
 from foosim.console.shown.timeline import NETWORK, Mark, WorldEvents
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.network.settings_text import event_words
@@ -149,6 +150,13 @@ class Following:
         world.history.keep_frame(frame.tick, moment.values)
         world.watched.keep(frame)
         return moment
+
+    def eyes(self) -> Eyes | None:
+        """Return what draws the pictures of cameras at the newest frame; None before the first one."""
+        world = self._world
+        if world is None or world.newest is None:
+            return None
+        return world.newest.tick, partial(world.drawing.picture, world.newest)
 
     def overlays(self, wanted: Collection[str]) -> list[dict[str, Any]]:
         """Return the messages with the overlays of the newest frame."""

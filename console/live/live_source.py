@@ -27,7 +27,7 @@ from foosim.console.live.following import Following, World, first_frame
 from foosim.console.live.sending import VERBS as JOB_VERBS
 from foosim.console.live.sending import Join, Sending
 from foosim.console.shown.curves import name_and_unit
-from foosim.console.shown.source import About, Answered, Curve, Feed, Wanted
+from foosim.console.shown.source import About, Answered, Curve, Eyes, Feed, Wanted
 from foosim.launcher.outcome import ended_outcome
 from foosim.runtime.run_folder import RunFolder
 from foosim.runtime.transport.inbox import Inbox, Item
@@ -98,6 +98,9 @@ class LiveSource:
         if self._sending is not None:
             self._sending.want(wanted.readers)
         self._changed.set()
+
+    def eyes(self) -> Eyes | None:
+        return self._following.eyes()
 
     async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         """Send a request to the supervisor. Raises RequestRefused, NoAnswer, ConnectError, BadValue."""

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -28,7 +29,7 @@ from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.recording import Look, Recording
 from foosim.console.shown.curves import name_and_unit
 from foosim.console.shown.links import Links, links_message
-from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Wanted
+from foosim.console.shown.source import About, Answered, Curve, Eyes, Feed, Moment, Wanted
 from foosim.console.shown.tracks import Where
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.text.files import read_source_file
@@ -94,6 +95,10 @@ class FileSource:
     def want(self, wanted: Wanted) -> None:
         self._wanted = wanted
         self.clock.changed()
+
+    def eyes(self) -> Eyes | None:
+        frame = None if self._look is None else self._look.frame
+        return None if frame is None else (frame.tick, partial(self.recording.drawing.picture, frame))
 
     # --- running -----------------------------------------------------------------------------------------------------
 

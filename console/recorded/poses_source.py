@@ -116,6 +116,9 @@ class PosesSource:
             period_ns = round(1e9 / (self._wanted.hz or UNSEEN_HZ))
             await clock.wait(None if clock.paused else clock.clock_ns() + period_ns, seen)
 
+    def eyes(self) -> None:
+        """It has no frames."""
+
     async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         if self._deck is None:
             raise InvalidRequest("recorded poses follow the first source: send the request to that one")

@@ -165,6 +165,9 @@ class PlayedSource:
 
     # --- requests ----------------------------------------------------------------------------------------------------
 
+    def eyes(self) -> None:
+        """It has no frames."""
+
     async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         checked(verb, arguments, ARGUMENTS)
         if verb == "play":

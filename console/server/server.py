@@ -12,8 +12,9 @@ import hmac
 import logging
 import os
 import ssl
-from base64 import urlsafe_b64encode
+from base64 import b64encode, urlsafe_b64encode
 from collections.abc import AsyncIterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -38,6 +39,8 @@ CONNECTIONS_MAX: Final = 256
 REQUESTS_MAX: Final = 8
 """Limit of one browser's unanswered requests."""
 HELLO_S: Final = 5.0
+LOOK: Final = "look"
+"""The verb of a look through a camera."""
 CLOSE_S: Final = 1.0
 PING_S: Final = 20.0
 WRITE_BYTES: Final = 64 * 1024
@@ -88,6 +91,7 @@ class ConsoleServer:
         self._files = page_files()
         self._connections: dict[str, ServerConnection] = {}
         """Of readers, by their name."""
+        self._drawing = ThreadPoolExecutor(1, "console-drawing")
         self._tasks: set[asyncio.Task[None]] = set()
         self.connections = 0
         """All that there are at this moment."""
@@ -126,6 +130,7 @@ class ConsoleServer:
             await server.wait_closed()
             for task in self._tasks:
                 task.cancel()
+            self._drawing.shutdown(wait=False, cancel_futures=True)
 
     async def run_sources(self) -> None:
         """Run all sources until this is cancelled."""
@@ -268,6 +273,9 @@ class ConsoleServer:
         """Forward a page's request to a source, and answer it."""
         source = self._sources[request.source]
         try:
+            if request.verb == LOOK:
+                self._put(reader, {**await self._look(source, request.arguments), "id": request.id})
+                return
             if reader.role != "operator":
                 raise InvalidRequest("this address only views; operate with the other printed address")
             if request.verb not in source.about.verbs:
@@ -290,6 +298,19 @@ class ConsoleServer:
                 "who": reader.name,
             },
         )
+
+    async def _look(self, source: Source, wanted: dict[str, Any]) -> dict[str, Any]:
+        """Return the answer to a look through a camera, which viewers may take: one picture is drawn at a time."""
+        camera = [wanted.get(name) for name in ("robot", "channel", "kind")]
+        eyes = source.eyes()
+        if len(wanted) != 3 or not all(isinstance(name, str) for name in camera):
+            raise InvalidRequest(f"{LOOK} takes robot, channel and kind")
+        if eyes is None:
+            raise InvalidRequest(f"{source.about.name} has no frame to draw yet")
+        tick, draw = eyes
+        picture = await self._loop.run_in_executor(self._drawing, draw, *camera)
+        text = "data:image/png;base64," + b64encode(picture).decode()
+        return {"type": "answer", "accepted": True, "text": "", "picture": text, "tick": tick, "verb": LOOK}
 
     async def _publish_history(self, reader: Reader, source: int, curves: tuple[Curve, ...]) -> None:
         """Send a browser the recorded points of curves that it has begun to plot."""

@@ -14,11 +14,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from foosim.common.errors import BadValue, UnknownName
 from foosim.console.shown.overlays import Overlays
 from foosim.console.shown.scene_json import scene_content
 from foosim.console.shown.source import Moment
 from foosim.console.shown.tracks import Pose
 from foosim.deployment.schema import Deployment
+from foosim.rendering.cameras import Camera, cameras_of
+from foosim.rendering.png import encode_png, visible
 from foosim.world.assembly.world import build_scene
 from foosim.world.component_types.descriptions import ABSENT
 from foosim.world.frame import Frame
@@ -120,6 +123,7 @@ class Drawing:
         self.entities: dict[str, int] = {name: self.links[body.links[-1].name] for name, body in bodies}
         """That of each entity's last link, by the entity's name."""
         self._overlays: Overlays | None = None
+        self._cameras: dict[tuple[str, str], Camera] = {}
 
     def known(self, poses: Mapping[str, Pose]) -> NDArray[np.float32]:
         """Return poses of links by name, in the order of the scene; NaN for links without one."""
@@ -138,6 +142,22 @@ class Drawing:
         """Return the moment of a frame."""
         values = frame.values
         return Moment(frame.tick, self.poser.poses(values), self.poser.numbers(values), jump, paused)
+
+    def picture(self, frame: Frame, robot: str, channel: str, kind: str) -> bytes:
+        """Return what a camera sees at a frame, as PNG; `kind` is that of a picture.
+
+        Raises UnknownName without such a camera, BadValue for one of another kind or an absent robot, AssetError.
+        """
+        key = robot, channel
+        if key not in self._cameras:
+            known = cameras_of(self.deployment)
+            if key not in known:
+                raise UnknownName("no camera", f"{robot}/{channel}", [f"{one}/{other}" for one, other in known])
+            self._cameras[key] = Camera(self.deployment, self.layout, robot, channel)
+        sight = self._cameras[key].at(frame.tick, frame.values.tolist())
+        if sight is None:
+            raise BadValue("its robot is absent", f"{robot}/{channel}")
+        return encode_png(visible(kind, sight.picture(kind)))
 
     def overlays(self, frame: Frame, wanted: Collection[str]) -> list[dict[str, Any]]:
         """Return the message with these overlays, and a note of each sensor that cannot be drawn from here on."""

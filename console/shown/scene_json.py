@@ -12,12 +12,14 @@ import numpy as np
 from foosim.client.commands import CommandEncoder
 from foosim.deployment.channel_kinds import joints_of
 from foosim.deployment.schema import Deployment
+from foosim.rendering.cameras import cameras_of
 from foosim.world.assembly.world import mark_kinds
 from foosim.world.component_types.payloads import PayloadCodec
 from foosim.world.component_types.per_field import codec_of
 from foosim.world.components.job_reading import JobSettings
 from foosim.world.kinematics import CENTRE_OF_SLOT
 from foosim.world.layout import Entity, Layout
+from foosim.world.matter.materials import METAL
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import (
     Box,
@@ -85,6 +87,10 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
         "fields": _fields(deployment, layout, scene),
         "commands": _commands(deployment, layout),
         "sensors": _sensors(deployment),
+        "cameras": [
+            {"robot": robot, "channel": channel, "pictures": list(settings.pictures)}
+            for (robot, channel), settings in cameras_of(deployment).items()
+        ],
         "meshes": {key: _mesh(mesh) for key, mesh in meshes.items()},
         "bounds": standing_bounds(scene),
         "marks": {
@@ -103,6 +109,7 @@ def _shapes(shapes: Iterable[Shape], meshes: dict[str, Mesh]) -> list[dict[str, 
     return [
         {
             **_geometry(shape, meshes),
+            "metal": shape.radio is METAL,
             "position": shape.position,
             "orientation": shape.orientation,
             "colour": shape.colour,

@@ -7,7 +7,7 @@ together look at. Whatever takes longer than a millisecond or waits goes into a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol
 
@@ -21,6 +21,8 @@ Link = tuple[str, str]
 """Names of sender and receiver."""
 Reading = tuple[str, str]
 """Names of a robot and of its channel."""
+Eyes = tuple[int, Callable[[str, str, str], bytes]]
+"""A tick, and a function for any thread that draws PNG: of a robot's camera, its channel, the kind of the picture."""
 FIGURES: Final = ("offered", "delivered", "dropped", "loss", "delay_ms", "queue_ms")
 """What can be plotted of a link."""
 
@@ -124,6 +126,9 @@ class Source(Protocol):
 
     def want(self, wanted: Wanted) -> None:
         """Take note of what the browsers look at. Called at each change, in the event loop's thread."""
+
+    def eyes(self) -> Eyes | None:
+        """Return what draws the pictures of cameras at the shown frame; None without a frame."""
 
     async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         """Execute a request; `who` names the browser. Raises Refused with the reason."""

@@ -7,6 +7,7 @@ import json
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,9 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from foosim.common.errors import Refused
 from foosim.console.server.server import ConsoleServer, Tokens
-from foosim.console.shown.drawing import HEAD, Poser
+from foosim.console.shown.drawing import HEAD, Drawing, Poser
 from foosim.console.shown.scene_json import scene_content
-from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Source, Wanted
+from foosim.console.shown.source import About, Answered, Curve, Eyes, Feed, Moment, Source, Wanted
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.initial_state import initial_frame
@@ -62,6 +63,9 @@ class MemorySource:
     def describe(self) -> None:
         assert self.feed is not None
         self.feed.describe(self.about, scene_content(self.deployment, self.layout, self.scene))
+
+    def eyes(self) -> Eyes:
+        return self.frame.tick, partial(Drawing(self.deployment).picture, self.frame)
 
     async def run(self, feed: Feed) -> None:
         self.feed = feed

@@ -11,6 +11,7 @@ from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 from foosim.console.server import server
 from foosim.console.server.server import CONNECTIONS_MAX
 from tests.console.memory import Console, MemorySource, console, table, table_with_spares
+from tests.deployed import deployed
 
 Part = Callable[[Console], Awaitable[None]]
 
@@ -291,3 +292,28 @@ def test_the_page_is_served_with_a_policy_and_nothing_else_is() -> None:
             assert (await get(stage, path, local, local))[0].startswith("HTTP/1.1 400 "), "RFC 9112, 3.2"
 
     play(part)
+
+
+def test_viewers_look_through_a_camera_and_a_wrong_one_is_refused() -> None:
+    eye = "{kind: rgbd, rate: 50 Hz, at: {z: 1.2 m}, look_at: {entity: ball}, width: 32, height: 18}"
+
+    async def scene() -> None:
+        deployment = deployed(f"robots.camera.sensors.eye={eye}")
+        async with asyncio.timeout(60), console(MemorySource(deployment)) as stage, stage.browser("look") as viewer:
+            assert (await viewer.hear("scene"))["cameras"] == [
+                {"robot": "camera", "channel": "eye", "pictures": ["image", "depth"]}
+            ]
+            pictures = []
+            for number, kind in enumerate(("image", "depth", "segmentation")):
+                wanted = {"robot": "camera", "channel": "eye", "kind": kind}
+                await viewer.say(type="request", id=number, verb="look", arguments=wanted)
+                answer = await viewer.hear("answer")
+                pictures.append(answer.get("picture", answer["text"]))
+            assert pictures[0] != pictures[1] and all(one.startswith("data:image/png;base64,") for one in pictures[:2])
+            assert "has image() and depth() alone" in pictures[2]
+            await viewer.say(
+                type="request", id=9, verb="look", arguments={"robot": "camera", "channel": "ear", "kind": "image"}
+            )
+            assert "nearest is 'camera/eye'" in (await viewer.hear("answer"))["text"]
+
+    asyncio.run(scene())

@@ -6,6 +6,7 @@ import { Connection, tokenOf } from "./connection.js";
 import { Control } from "./control.js";
 import { Desk } from "./desk.js";
 import { Entities } from "./entities.js";
+import { Eye } from "./eye.js";
 import { Layout, Memory } from "./layout.js";
 import { Log } from "./log.js";
 import { Machines } from "./machines.js";
@@ -87,6 +88,7 @@ new Comparison(store);
 const log = new Log(store);
 const view = makeView();
 const bar = new ViewBar(options, changedOption, () => view.home());
+new Eye(connection, store, byId("over"));
 
 function makeView() {
   const has3d = document.createElement("canvas").getContext("webgl2") !== null;

@@ -2,11 +2,15 @@
 
 import {
   BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, CylinderGeometry, DynamicDrawUsage, InstancedMesh, Matrix4,
-  MeshLambertMaterial, Quaternion, SphereGeometry, Vector3,
+  MeshPhongMaterial, Quaternion, SphereGeometry, Vector3,
 } from "three";
+import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 import { FLOATS_PER_LINK, decodeMesh, isPlaced } from "./messages.js";
 
 /** @typedef {{shape: Shape, link: number}} Placed a shape and its link; -1: it never moves */
+
+/** Faces of a mesh that meet at less than this (rad) look like one smooth surface. */
+const CREASE = 0.72;
 
 const at = new Vector3();
 const turn = new Quaternion();
@@ -47,21 +51,24 @@ function geometryOf({ kind, radius, length }, mesh) {
     const { vertices, triangles } = decodeMesh(mesh);
     geometry.setAttribute("position", new BufferAttribute(vertices, 3));
     geometry.setIndex(new BufferAttribute(triangles, 1));
-    geometry.computeVertexNormals();
+    return toCreasedNormals(geometry, CREASE);
   }
   return geometry;
 }
 
 /** All shapes of one geometry. */
 class Batch {
-  /** @param {BufferGeometry} geometry @param {Placed[]} placed @param {number} opacity */
-  constructor(geometry, placed, opacity) {
+  /** @param {BufferGeometry} geometry @param {Placed[]} placed @param {number} opacity @param {boolean} [metal] */
+  constructor(geometry, placed, opacity, metal = false) {
     this.placed = placed;
     this.locals = placed.map(({ shape }) => localMatrix(shape));
-    const material = new MeshLambertMaterial({ transparent: opacity < 1, opacity, depthWrite: opacity === 1 });
+    const material = new MeshPhongMaterial({
+      transparent: opacity < 1, opacity, depthWrite: opacity === 1, specular: metal ? "#9a9a9a" : "#161616", shininess: metal ? 60 : 20,
+    });
     this.mesh = new InstancedMesh(geometry, material, placed.length);
     this.mesh.instanceMatrix.setUsage(DynamicDrawUsage);
     this.mesh.frustumCulled = false;
+    this.mesh.castShadow = this.mesh.receiveShadow = opacity === 1;
     this.mesh.userData.batch = this;
     this.locals.forEach((local, index) => this.mesh.setMatrixAt(index, local));
   }
@@ -83,7 +90,7 @@ class Batch {
 
   dispose() {
     this.mesh.geometry.dispose();
-    /** @type {MeshLambertMaterial} */ (this.mesh.material).dispose();
+    /** @type {MeshPhongMaterial} */ (this.mesh.material).dispose();
     this.mesh.dispose();
   }
 }
@@ -101,15 +108,15 @@ export function batchesOf(scene, opacity) {
   /** @type {Map<string, Placed[]>} */
   const groups = new Map();
   for (const one of placed) {
-    const { kind, mesh, radius, length, colour } = one.shape;
+    const { kind, mesh, radius, length, colour, metal } = one.shape;
     const size = kind === "capsule" ? `${radius} ${length}` : "";
-    const key = `${kind} ${mesh ?? ""} ${size} ${colour[3] * opacity}`;
+    const key = `${kind} ${mesh ?? ""} ${size} ${colour[3] * opacity} ${metal}`;
     const group = groups.get(key);
     if (group) group.push(one);
     else groups.set(key, [one]);
   }
   return [...groups.values()].map((group) => {
-    const { mesh, colour } = group[0].shape;
-    return new Batch(geometryOf(group[0].shape, scene.meshes[mesh ?? ""]), group, colour[3] * opacity);
+    const { mesh, colour, metal } = group[0].shape;
+    return new Batch(geometryOf(group[0].shape, scene.meshes[mesh ?? ""]), group, colour[3] * opacity, metal);
   });
 }

@@ -167,6 +167,7 @@ export class Store {
         this.note(message.level, message.text);
         return;
       case "answer":
+        if (message.verb === "look") return;
         // The slider shows what became of a request for another moment of a recording.
         this.note(!message.accepted ? "error" : this.main?.info.kind === "live" ? "answer" : "info", message.text || `${message.verb}: done`, message.who, message.tick);
         return;

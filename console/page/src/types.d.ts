@@ -10,6 +10,7 @@ interface Shape {
   radius?: number;
   length?: number;
   mesh?: string;
+  metal?: boolean;
   position: Vec3;
   orientation: Quat;
   colour: Rgba;
@@ -39,6 +40,7 @@ interface SceneMessage {
   fields: SceneField[];
   commands: SceneCommand[];
   sensors: SceneSensor[];
+  cameras?: { robot: string; channel: string; pictures: string[] }[];
   meshes: Record<string, { vertices: string; triangles: string }>;
   bounds: [Vec3, Vec3];
   /** The kinds of marks that the rules of the world bring. */
@@ -107,7 +109,7 @@ interface Presence {
 }
 /** Jobs that the console has given, and why it can give none. */
 interface JobsMessage { source: number; problem: string; jobs: { robot: string; actuator: string; number: number | null; state: string; text: string; ended: boolean }[] }
-interface Answer { id: number; accepted: boolean; text: string; tick: number; verb: string; who: string }
+interface Answer { picture?: string; id: number; accepted: boolean; text: string; tick: number; verb: string; who: string }
 interface Compared {
   at: number;
   /** First and last tick of the first source's clock at which the second one has something. */

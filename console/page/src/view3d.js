@@ -15,6 +15,10 @@ const CLICK_PX = 5;
 const PIXEL_RATIO_MAX = 2;
 /** Drawn anew although nothing moved: what the page looks like settles. */
 const FRAMES_AFTER_CHANGE = 4;
+/** The side of the shadow map. */
+const SHADOW_PX = 1024;
+/** The direction to the sun, as cameras have it (rendering/model.py). */
+const SUN = new Vector3(0.384, 0.288, 0.877);
 const HOME_ROUNDS = 16;
 /** The world stands below the middle by this share of half the height: above it is the bar of the view. */
 const HOME_DROP = 0.06;
@@ -59,10 +63,12 @@ export class View3D {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.touch());
-    this.scene.add(new HemisphereLight("#ffffff", "#a0a4ab", 2.4));
-    const sun = new DirectionalLight("#ffffff", 1.6);
-    sun.position.set(2, -3, 5);
-    this.scene.add(sun);
+    this.scene.add(new HemisphereLight("#ffffff", "#a0a4ab", 1.7));
+    this.sun = new DirectionalLight("#ffffff", 2.2);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(SHADOW_PX, SHADOW_PX);
+    this.renderer.shadowMap.enabled = true;
+    this.scene.add(this.sun, this.sun.target);
     this.radio = new RadioLines();
     this.overlays = new Overlays();
     this.scene.add(this.radio.group, this.overlays.group);
@@ -191,7 +197,8 @@ export class View3D {
     const size = box.getSize(new Vector3());
     const centre = box.getCenter(new Vector3());
     const reach = size.length();
-    this.camera.near = reach / 500;
+    this._light(centre, reach);
+    this.camera.near = reach / 150;
     this.camera.far = reach * 40;
     this.camera.aspect = this.place.clientWidth / (this._is_split ? 2 : 1) / Math.max(1, this.place.clientHeight);
     this.camera.updateProjectionMatrix();
@@ -207,6 +214,17 @@ export class View3D {
     this.controls.update();
     this._lay_grid(size, box);
     this.touch();
+  }
+
+  /** Have the sun's shadows cover the world. @param {Vector3} centre @param {number} reach m */
+  _light(centre, reach) {
+    this.sun.target.position.copy(centre);
+    this.sun.position.copy(centre).addScaledVector(SUN, reach);
+    const { camera } = this.sun.shadow;
+    [camera.left, camera.right, camera.bottom, camera.top] = [-reach / 2, reach / 2, -reach / 2, reach / 2];
+    [camera.near, camera.far] = [reach / 4, reach * 2];
+    camera.updateProjectionMatrix();
+    this.sun.shadow.normalBias = reach / SHADOW_PX;
   }
 
   /**
