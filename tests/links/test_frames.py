@@ -20,7 +20,8 @@ from foosim.deployment.network.presets import PRESETS
 from foosim.simulation.run import rehearse
 from foosim.simulation.what_if import what_if
 from foosim.vhub.links.fabric import Fabric
-from foosim.vhub.network.packet import Flight, frames_of
+from foosim.vhub.network.mtu import frames_of
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import (
     LRWPAN_OVERHEAD_BYTES,
     WIFI_OVERHEAD_BYTES,

@@ -13,8 +13,7 @@ from math import inf
 from foosim.common.limits import FRAMES_MAX
 from foosim.deployment.network.link_settings import Profile, Profiles
 from foosim.deployment.schema import Deployment
-from foosim.vhub.network.packet import frames_of
-from foosim.vhub.stages.admission import longest_of
+from foosim.vhub.network.mtu import frames_of, longest_of
 from foosim.world.component_types.per_field import payload_bytes
 from foosim.world.component_types.settings import SensorSettings
 

@@ -93,14 +93,6 @@ def size_of_payload(size: int) -> int:
     return PACKET_HEAD_BYTES_MAX + size
 
 
-def frames_of(size: int, mtu: int | None) -> tuple[int, ...]:
-    """Return the sizes of the frames in which a packet of `size` bytes travels over a link with an mtu (bytes)."""
-    if mtu is None or size <= mtu:
-        return (size,)
-    whole, rest = divmod(size, mtu)
-    return (mtu,) * whole + ((rest,) if rest else ())
-
-
 def level_cdbm(power: int) -> int:
     """Return a power in units of 1e-21 W as a level in 0.01 dBm; 0 for no power."""
     return centi(level_of(power)) if power else 0

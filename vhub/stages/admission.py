@@ -8,21 +8,15 @@ from __future__ import annotations
 
 from typing import Final
 
-from foosim.common.limits import FRAMES_MAX
-from foosim.deployment.network.radios import Radio
 from foosim.vhub.network.link_context import LinkSetup
-from foosim.vhub.network.packet import Flight, frames_of
+from foosim.vhub.network.mtu import frames_of, longest_of
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
 
 TOO_BIG: Final = "too_big"
 NODE_DOWN: Final = "node_down"
 NO_ROUTE: Final = "no_route"
-
-
-def longest_of(settings: Radio) -> int | None:
-    """Return the greatest size of a packet (bytes) that a link carries; None without a limit."""
-    return None if settings.payload_max is None else settings.payload_max * FRAMES_MAX
 
 
 class Admission(Stage):

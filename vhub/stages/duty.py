@@ -12,7 +12,8 @@ from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.memory import RadioState, Sending
-from foosim.vhub.network.packet import Flight, frames_of
+from foosim.vhub.network.mtu import frames_of
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.radio.airtime import lora_airtime_ns, serialisation_ns
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage

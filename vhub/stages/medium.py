@@ -23,7 +23,8 @@ from foosim.vhub.network.air import Air
 from foosim.vhub.network.link_budget import Budget
 from foosim.vhub.network.link_context import BLOCK_SHIFT, LinkSetup
 from foosim.vhub.network.memory import RadioState, Sending, Transmission
-from foosim.vhub.network.packet import Flight, frames_of
+from foosim.vhub.network.mtu import frames_of
+from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.turns import Contest
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (

@@ -276,21 +276,22 @@ def _load(entry: EntryPoint) -> str:
 
 def _own(type_name: str, name: str) -> ComponentType | None:
     """Return one of foosim's own, imported from its module; None for an unknown name."""
-    _import_own(name)
-    return _known.get((type_name, name))
-
-
-def _import_own(name: str) -> None:
     for module in _own_modules().get(name, ()):
         import_module(module)
+        if (type_name, name) in _known:  # a module of another type may bring numpy
+            break
+    return _known.get((type_name, name))
 
 
 @cache
 def _own_modules() -> Mapping[str, Sequence[str]]:
-    """Return the modules of foosim's own component types by name: a sensor and a model may have one name."""
+    """Return the modules of foosim's own component types by name: a sensor and a model may have one name.
+
+    Those of all worlds are last: they have the sensors that take the longest to import.
+    """
     folders = import_module(LIBRARY).__path__
     found: dict[str, list[str]] = {}
-    for kind in (kind.name for kind in iter_modules(folders) if kind.ispkg):
+    for kind in sorted([kind.name for kind in iter_modules(folders) if kind.ispkg], reverse=True):
         for module in iter_modules([f"{folder}/{kind}" for folder in folders]):
             if not module.ispkg:
                 found.setdefault(module.name, []).append(f"{LIBRARY}.{kind}.{module.name}")
