@@ -97,8 +97,13 @@ def frames_of(size: int, mtu: int | None) -> tuple[int, ...]:
     """Return the sizes of the frames in which a packet of `size` bytes travels over a link with an mtu (bytes)."""
     if mtu is None or size <= mtu:
         return (size,)
-    whole, rest = divmod(size, mtu)
-    return (mtu,) * whole + ((rest,) if rest else ())
+    more = frame_count(size, mtu) - 1
+    return (mtu,) * more + (size - more * mtu,)
+
+
+def frame_count(size: int, mtu: int | None) -> int:
+    """Return the number of these frames."""
+    return 1 if mtu is None or size <= mtu else -(-size // mtu)
 
 
 def level_cdbm(power: int) -> int:
