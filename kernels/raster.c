@@ -8,6 +8,7 @@ leave no gap. The nearness is a plane over the triangle, rounded to float; the l
 #include <stdlib.h>
 
 #define GUARD 1048576.0 /* Pixels about the picture beyond which triangles are clipped: products stay below 2^63. */
+#define CLIPPED 20 /* Corners: a plane makes 4, 6, 9, 13, 19 of 3 at most, where rounding bends the edges of a sliver. */
 
 typedef struct { double x, y, w, z; } Corner;
 typedef struct { int64_t width, first, end; float *nearness; int32_t *numbers; } Band;
@@ -67,7 +68,7 @@ static double inside(const Corner *p, int plane, double near) {
 
 /* Clip by near and guard planes, always from the corner inside: neighbours meet in equal bits. */
 static int clip(Corner *polygon, double near) {
-    Corner kept[8];
+    Corner kept[CLIPPED];
     int count = 3;
     for (int plane = 0; plane < 5; plane++) {
         int n = 0;
@@ -89,7 +90,7 @@ static int clip(Corner *polygon, double near) {
 
 static void draw(const Band *band, double height, double near, const Corner *all, const int32_t *corners, int both,
                  int32_t number) {
-    Corner p[8] = {all[corners[0]], all[corners[1]], all[corners[2]]};
+    Corner p[CLIPPED] = {all[corners[0]], all[corners[1]], all[corners[2]]};
     double width = (double)band->width;
     int is_plain = 1, count = 3, low = 15, right = 1, below = 1;
     for (int i = 0; i < 3; i++) {
@@ -100,8 +101,8 @@ static void draw(const Band *band, double height, double near, const Corner *all
     }
     if (low || right || below) return;
     if (!is_plain) count = clip(p, near);
-    int64_t x[8], y[8];
-    double nearness[8];
+    int64_t x[CLIPPED], y[CLIPPED];
+    double nearness[CLIPPED];
     for (int i = 0; i < count; i++) {
         double d = 1.0 / p[i].w;
         x[i] = (int64_t)floor(p[i].x * d * 256.0 + 0.5), y[i] = (int64_t)floor(p[i].y * d * 256.0 + 0.5);

@@ -29,7 +29,7 @@ KEPT_VIEWS: Final = 32
 class Drawn(NamedTuple):
     """One picture: `colour` (height, width, 3) of red, green, blue from 0 to 255; `depth` (height, width), the distance
     along the camera's axis (m), 0 where nothing is seen; `segmentation` (height, width), 1 + the number of the thing in
-    `Drawer.things`, 0 where nothing is seen."""
+    `Drawer.things`, 0 where nothing is seen. They are read-only."""
 
     colour: NDArray[np.uint8]
     depth: NDArray[np.float32]
@@ -101,11 +101,11 @@ class Drawer:
         if lens is not None:
             colour, nearness, triangles = lens.mixed(colour), lens.nearest(nearness, 0), lens.nearest(triangles, NONE)
         depth = np.divide(np.float32(1.0), nearness, out=np.zeros_like(nearness), where=triangles != NONE)
-        return Drawn(
-            sensed(colour, optics.gain, optics.noise, key),
-            depth,
-            self._model.thing.take(triangles, mode="wrap") + np.int32(1),
-        )
+        things = self._model.thing.take(triangles, mode="wrap") + np.int32(1)
+        drawn = Drawn(sensed(colour, optics.gain, optics.noise, key), depth, things)
+        for picture in drawn:
+            picture.setflags(write=False)  # readers of one process share it
+        return drawn
 
     def _light(self, triangles: Ints) -> None:
         """Give triangles the facing and the colours that they have where they are flat."""

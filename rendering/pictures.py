@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.common.errors import BadValue
+from foosim.common.errors import BadValue, Malformed
 from foosim.common.keyed_random import draw_key, draw_words
+from foosim.common.limits import COUNTER_MAX
 from foosim.rendering.drawer import Drawer, Drawn
 from foosim.rendering.readings import drawn_world
 from foosim.world.components.cameras import PictureSettings
@@ -89,6 +90,8 @@ class Pictures:
     def _draw(self, sight: Sight) -> Drawn:
         optics, drawer = self._optics, drawer_of(self._spec, self._what)
         links = drawn_world(self._spec, self._what).placed(sight, self._what, LINK_BLURRED if optics.exposure else LINK)
+        if not 0.0 <= sight.tick <= COUNTER_MAX:
+            raise Malformed(f"{self._what}: no tick, {sight.tick:g}")
         self.draws += 1
         return drawer.draw(
             optics,
@@ -97,5 +100,5 @@ class Pictures:
             links.numbers,
             links.poses,
             links.more if optics.exposure else None,
-            draw_words(self._key, max(0, int(sight.tick)))[0] if optics.noise else 0,
+            draw_words(self._key, int(sight.tick))[0] if optics.noise else 0,
         )

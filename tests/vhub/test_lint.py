@@ -208,7 +208,7 @@ def test_every_link_of_a_deployment_is_in_one_line() -> None:
 def test_who_offers_more_than_is_carried_is_warned_of() -> None:
     made = deployment("{links: [{id: thin, from: '*', to: '*', rate: 64 kbit/s}]}")
     (thin,) = summaries(made)
-    assert thin.warnings == ("one sender offers 100 packets/s as declared; of 100 B it carries 80/s",)
+    assert thin.warnings == ("one sender offers 100 frames/s as declared; of 100 B it carries 80/s",)
 
 
 @pytest.mark.parametrize("limit", [16, 1023, 1024])

@@ -13,7 +13,7 @@ from math import inf
 from foosim.common.limits import FRAMES_MAX
 from foosim.deployment.network.link_settings import Profile, Profiles
 from foosim.deployment.schema import Deployment
-from foosim.vhub.network.mtu import frames_of, longest_of
+from foosim.vhub.network.mtu import frame_count, longest_of
 from foosim.world.component_types.per_field import payload_bytes
 from foosim.world.component_types.settings import SensorSettings
 
@@ -59,7 +59,7 @@ def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
             rate_hz = 0.0 if sensor is None else float(sensor.rate_hz)
             flow = Flow(profiles.find(source, player, channel), source, player, channel, rate_hz)
             size = max([size for _, size in _sizes(deployment, flow)], default=0)
-            yield replace(flow, frames=len(frames_of(size, flow.profile.settings.payload_max)))
+            yield replace(flow, frames=frame_count(size, flow.profile.settings.payload_max))
         for name in spec.robots:
             if deployment.robots[name].actuators:
                 yield Flow(profiles.find(player, name, ""), player, name, "", float(spec.rate_hz))

@@ -189,7 +189,7 @@ def summaries(deployment: Deployment) -> list[LinkSummary]:
         if capacity_hz is not None and load_hz > capacity_hz:
             which = "all together offer" if use.settings.is_on_air else "one sender offers"
             warnings.append(
-                f"{which} {load_hz:.0f} packets/s as declared; of {SMALL_BYTES} B it carries {capacity_hz:.3g}/s"
+                f"{which} {load_hz:.0f} frames/s as declared; of {SMALL_BYTES} B it carries {capacity_hz:.3g}/s"
             )
         found.append(replace(summary, warnings=tuple(warnings)))
     return found

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from foosim.vhub.network.link_context import LinkSetup
-from foosim.vhub.network.mtu import frames_of, longest_of
+from foosim.vhub.network.mtu import frame_count, longest_of
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
@@ -42,10 +42,9 @@ class Admission(Stage):
         limit = "any size" if self._longest is None else f"at most {self._longest} B"
         state = seen.out_of_service(row.source) if row.cause == NODE_DOWN else "in service"
         note.add("{size} B of {}, sender {sender}", limit, size=row.size, mtu=mtu, sender=state)
-        frames = frames_of(row.size, mtu)
-        note.facts["frames"] = len(frames)
-        if len(frames) > 1 and row.cause != TOO_BIG:
-            note.text += f", {len(frames)} frames of {mtu} B, the last of {frames[-1]} B"
+        frames = note.facts["frames"] = frame_count(row.size, mtu)
+        if mtu is not None and frames > 1 and row.cause != TOO_BIG:
+            note.text += f", {frames} frames of {mtu} B, the last of {row.size - (frames - 1) * mtu} B"
 
 
 class NoRoute(Admission):

@@ -23,7 +23,7 @@ from foosim.vhub.network.air import Air
 from foosim.vhub.network.link_budget import Budget
 from foosim.vhub.network.link_context import BLOCK_SHIFT, LinkSetup
 from foosim.vhub.network.memory import RadioState, Sending, Transmission
-from foosim.vhub.network.mtu import frames_of
+from foosim.vhub.network.mtu import frame_count, frames_of
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.network.turns import Contest
 from foosim.vhub.radio import errors
@@ -76,7 +76,7 @@ class Wire(Stage):
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
         start_ns = max(flight.sent_ns, sender.free_ns)
-        size = flight.size + self._overhead * len(frames_of(flight.size, self._mtu))
+        size = flight.size + self._overhead * frame_count(flight.size, self._mtu)
         if self._trace:
             end_ns = self._opportunity_ns(start_ns, size)
         else:

@@ -12,6 +12,7 @@ from typing import Final
 from foosim.deployment.network.radios import Radio
 from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.memory import Sending
+from foosim.vhub.network.mtu import frame_count
 from foosim.vhub.network.packet import Flight
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.policy import EXPIRED
@@ -33,8 +34,7 @@ class Limits:
 
     def size(self, flight: Flight) -> int:
         """Return the bytes of a packet in the queue, with the overhead of each frame."""
-        frames = 1 if self._mtu is None or flight.size <= self._mtu else -(-flight.size // self._mtu)
-        return flight.size + self._overhead * frames
+        return flight.size + self._overhead * frame_count(flight.size, self._mtu)
 
 
 class Queue(Stage):

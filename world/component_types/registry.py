@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from itertools import chain
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
@@ -233,8 +234,8 @@ def find_model(kind: str) -> Model:
 
 def names(type_name: str) -> list[str]:
     """Return the names of all installed component types with a type name, sorted."""
-    for name in _own_modules():
-        _import_own(name)
+    for module in chain.from_iterable(_own_modules().values()):
+        import_module(module)
     load_entry_points()
     packages = {entry.module.partition(".")[0] for entry in _entry_points()}
     return sorted(
