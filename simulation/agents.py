@@ -52,8 +52,9 @@ class Agent:
         """By each (endpoint, channel) that it hears."""
         self.newest: dict[Pair, Received] = {}
 
-    def begin(self) -> None:
-        """Forget what was heard and sent."""
+    def begin(self, deployment: Deployment) -> None:
+        """Forget what was heard and sent. The noise of pictures is that of the seed of `deployment`."""
+        self.channels = channels_of(deployment, self.hears)
         self.sequence = self.malformed = self.since = 0
         self.newest = {}
 

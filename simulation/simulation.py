@@ -125,7 +125,7 @@ class Simulation:
         return _frame(self._seeded(seed), start)
 
     def _seeded(self, seed: int | None) -> Deployment:
-        return self.declared if seed is None else self.declared.model_copy(update={"seed": seed})
+        return self.declared if seed is None else self.deployment.with_seed(seed)
 
     def _begin(self, deployment: Deployment, frame: Frame) -> None:
         self.deployment = deployment
@@ -136,7 +136,7 @@ class Simulation:
         else:
             self._world.begin(deployment, frame)
         for agent in self.agents.values():
-            agent.begin()
+            agent.begin(deployment)
         joining = [
             Joining(name, self.period, agent.hears, frame.tick % self.period) for name, agent in self.agents.items()
         ]

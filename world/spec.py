@@ -38,6 +38,9 @@ SURFACES_MAX: Final = 64
 ROBOT_FILES_MAX: Final = 256
 """The greatest count of files of robots' models in one world."""
 
+SEEDLESS: Final = frozenset({"fetched", "drawn world", "drawer", "casting"})
+"""Shared values that are the same with any seed."""
+
 Section = TypeVar("Section", bound=SpecBase)
 
 
@@ -170,6 +173,14 @@ class WorldSpec(SpecBase):
             found = make()
             self._shared = {**self._shared, what: (self, found)}
         return found
+
+    def with_seed(self, seed: int) -> Self:
+        """Return the world with another seed. It shares what draws its scene: that does not depend on the seed."""
+        spec = self.model_copy(update={"seed": seed})
+        spec._shared = {
+            what: (spec, found) for what, (owner, found) in self._shared.items() if owner is self and what in SEEDLESS
+        }
+        return spec
 
     def with_contents(self, contents: Contents) -> Self:
         """Return the world with the contents of the files that it names."""

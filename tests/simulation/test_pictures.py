@@ -50,6 +50,12 @@ def test_an_environment_observes_pictures() -> None:
     sight = env.simulation.readings["camera", "eye"].value
     assert np.array_equal(second["camera/eye.image"], sight.image())  # type: ignore[union-attr]
     assert sight.kept["drawn_by"].draws <= 2  # type: ignore[union-attr]
+    again, _ = env.reset(seed=5)
+    other, _ = env.reset(seed=6)
+    same, _ = env.reset(seed=5)
+    assert np.array_equal(again["camera/eye.image"], same["camera/eye.image"])
+    assert not np.array_equal(again["camera/eye.image"], other["camera/eye.image"]), "noise is the episode's"
+    assert np.array_equal(again["camera/eye.depth"], other["camera/eye.depth"])
     env.close()
     with pytest.raises(UnknownName, match="waver hears no camera"):
         FoosimEnv(TABLE, sets=[LOOKERS.replace("[eye]", "[ball]")], pictures=["*"])
