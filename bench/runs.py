@@ -21,6 +21,8 @@ from foosim.launcher.display import Display
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.launcher.up import Up
+from foosim.protocol.channels import SUPERVISOR
+from foosim.runtime.process import FOOSIM
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 TABLE: Final = ROOT / "deploy" / "table.yaml"
@@ -126,8 +128,16 @@ def name_of(command: Sequence[str]) -> str:
     """Return the name of a process in its run, by its command line; empty for any other process."""
     if "--name" in command[:-1]:
         return command[command.index("--name") + 1]
-    programs = [Path(word).name for word in command[:2]]
-    return next((name.removeprefix("foosim-") for name in programs if name.startswith("foosim-")), "")
+    if [Path(word).name for word in command[1:2]] != [FOOSIM]:
+        return ""
+    match command[2:]:
+        case ["run", *_]:
+            return SUPERVISOR
+        case ["role", "roles", process, *_]:
+            return process
+        case ["role", role, *_]:
+            return role
+    return ""
 
 
 def watch(  # parameters of a run, by keyword
