@@ -15,6 +15,7 @@ from typing import Any, Final
 from bench import (
     answers,
     bodies,
+    cameras,
     distributed,
     env,
     fleet,
@@ -64,6 +65,12 @@ BENCHES: Final = (
     Bench("bodies", "rigid bodies of any kind", lambda _: bodies.bodies(), bodies.lines),
     Bench("rays", "scans of a fleet, by the kernel and by numpy", lambda _: rays.rays(), rays.lines),
     Bench("rendering", "pictures of the table", lambda _: rendering.rendering(), rendering.lines),
+    Bench(
+        "cameras",
+        "pictures on the table, and twenty robots with cameras in real time",
+        with_default(cameras.cameras),
+        cameras.lines,
+    ),
     Bench("verdict", "verdicts with their rows, wire and Wi-Fi", with_default(verdict.verdict), verdict.lines),
     Bench("env", "steps of an environment for learning, and of two processes", with_default(env.env), env.lines),
     Bench("answers", "when a job is known to be taken", with_default(answers.answers), answers.lines),

@@ -30,6 +30,7 @@ RUNS = {
     "warehouse": ("warehouse.yaml", 50, []),
     "yard": ("yard.yaml", 100, []),
     "workshop": ("workshop.yaml", 100, []),
+    "eyes": ("eyes.yaml", 10, []),
 }
 """Deployment, ticks and settings."""
 REHEARSALS = """
