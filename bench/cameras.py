@@ -66,8 +66,16 @@ def cameras(seconds: float = 10.0) -> Cameras:
     shares = {cost.name: round(cost.cpu_us_per_tick * per_s, 2) for cost in costs}
     pictures_per_s = run.found / (run.result["ticks"] * run.tick_s)
     return Cameras(
-        *(round(node_us, 1), round(capture_bytes), round(b, 1), float(run.result["rtf"])),
-        *(lag["p50"], lag["p99"], lag["max"], shares, round(pictures_per_s, 1), costs),
+        round(node_us, 1),
+        round(capture_bytes),
+        round(b, 1),
+        float(run.result["rtf"]),
+        lag["p50"],
+        lag["p99"],
+        lag["max"],
+        shares,
+        round(pictures_per_s, 1),
+        costs,
     )
 
 
