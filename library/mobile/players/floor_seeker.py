@@ -18,20 +18,13 @@ from foosim.library.generic.laser_scanner import Scan
 from foosim.library.mobile.v_w import Motion
 from foosim.world.components.sight import Sight
 
-SPEED: Final = 0.7
-"""m/s, where all is free ahead."""
-SLOW_M: Final = 1.5
-"""It slows down from this distance to the next thing ahead,"""
-STOP_M: Final = 0.4
-"""and stops at this one, where it turns on the spot."""
-TURN: Final = 4.0
-"""rad/s for each share of the picture that one side has more floor than the other."""
-TURN_ON_SPOT: Final = 1.2
-"""rad/s"""
-ALIKE: Final = 12
-"""Greatest difference of a colour to that of the floor, from 0 to 255."""
-EVERY: Final = 4
-"""It looks at each fourth pixel of a row and a column."""
+SPEED: Final = 0.7  # m/s, where all is free ahead
+SLOW_M: Final = 1.5  # it slows down from this distance ahead,
+STOP_M: Final = 0.4  # and turns on the spot at this one
+TURN: Final = 4.0  # rad/s for each share of the picture that one side has more floor than the other
+TURN_ON_SPOT: Final = 1.2  # rad/s
+ALIKE: Final = 12  # the greatest difference of a colour from 0 to 255 to that of the floor
+EVERY: Final = 4  # it looks at each fourth pixel of a row and a column
 
 
 class FloorSeeker(Player):
@@ -51,17 +44,16 @@ class FloorSeeker(Player):
             eye, scan = samples.get((robot, "eye")), samples.get((robot, "scan"))
             if eye is not None and scan is not None:
                 assert isinstance(eye.value, Sight) and isinstance(scan.value, Scan)
-                motions[robot] = self._motion(robot, more_floor_left(eye.value.image()), scan.value.distances)
+                leftwards, ways = more_floor_left(eye.value.image()), scan.value.distances
+                side = len(ways) // 6  # the middle two thirds are ahead
+                ahead = min(ways[side : len(ways) - side])
+                if ahead < STOP_M:
+                    turning = TURN_ON_SPOT if leftwards >= 0.0 else -TURN_ON_SPOT
+                    motions[robot] = Motion(0.0, self._turning.setdefault(robot, turning))
+                else:
+                    self._turning.pop(robot, None)
+                    motions[robot] = Motion(SPEED * min(1.0, (ahead - STOP_M) / (SLOW_M - STOP_M)), TURN * leftwards)
         return motions
-
-    def _motion(self, robot: str, leftwards: float, distances: tuple[float, ...]) -> Motion:
-        """Return the motion towards more floor; two thirds of the distances (m), the middle ones, are the way ahead."""
-        side = len(distances) // 6
-        ahead = min(distances[side : len(distances) - side])
-        if ahead < STOP_M:
-            return Motion(0.0, self._turning.setdefault(robot, TURN_ON_SPOT if leftwards >= 0.0 else -TURN_ON_SPOT))
-        self._turning.pop(robot, None)
-        return Motion(SPEED * min(1.0, (ahead - STOP_M) / (SLOW_M - STOP_M)), TURN * leftwards)
 
 
 def more_floor_left(image: NDArray[np.uint8]) -> float:
