@@ -2,7 +2,8 @@
 
 A picture's node measures and encodes the poses in view: processor time, the least and the median of equal turns.
 What it adds to a capture is the difference of two captures of a rehearsal, with the camera and without,
-over the count of its packets. The run in real time is `deploy/eyes.yaml` as `up` runs it: its players look at each picture, and draw it.
+over the count of its packets. The run in real time is `deploy/eyes.yaml` as `up` runs it: its players look at each
+picture, and draw it.
 """
 
 from __future__ import annotations
