@@ -5,7 +5,7 @@ A limit bounds the cost of a wrong or hostile peer, file or request. A refusal n
 
 from typing import Final
 
-PROTOCOL_VERSION: Final = 5
+PROTOCOL_VERSION: Final = 6
 """Version of the messages; a peer with another one is refused at the handshake, both versions named."""
 
 NAME_LENGTH_MAX: Final = 32
