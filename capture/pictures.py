@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from fnmatch import fnmatchcase
 from pathlib import Path
-from struct import pack
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -26,8 +24,9 @@ from foosim.capture.mcap.writer import McapWriter
 from foosim.capture.new_file import check_absent, new_file
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import PACKETS, PacketRow
-from foosim.common.errors import BadValue, Failed, Malformed
+from foosim.common.errors import BadValue, Failed
 from foosim.rendering.cameras import OVERVIEW, Camera, Overview, cameras_of
+from foosim.rendering.png import encode_png
 from foosim.rendering.view import focal_length
 from foosim.world.components.sight import Sight
 from foosim.world.frame import Frame
@@ -102,11 +101,8 @@ def pictures_of(
         if key not in cameras or (row.source, row.sequence) in seen:
             continue
         heard.add(key)
-        try:
-            sight = cameras[key].of(row.payload)
-        except Malformed:  # changed by the network: another copy may be whole
-            continue
         seen.add((row.source, row.sequence))
+        sight = cameras[key].of(row.payload)
         if first <= sight.tick <= last:
             yield Picture(cameras[key], int(sight.tick), sight)
     silent = [camera for key, camera in cameras.items() if key not in heard]
@@ -129,20 +125,6 @@ def _ticks(capture: CaptureData, span_ns: tuple[int, int | None]) -> tuple[int, 
 # --- PNG -------------------------------------------------------------------------------------------------------------
 
 
-def png(pixels: NDArray[Any]) -> bytes:
-    """Return a PNG file of colours (height, width, 3) of 8 bits, or of grey values (height, width) of 16 bits."""
-    height, width = pixels.shape[:2]
-    depth, kind, rows = (8, 2, pixels) if pixels.ndim == 3 else (16, 0, pixels.astype(">u2"))
-    lines = np.ascontiguousarray(rows).view(np.uint8).reshape(height, -1)
-    data = zlib.compress(np.pad(lines, ((0, 0), (1, 0))).tobytes(), 6)  # a line begins with its filter, 0
-
-    def chunk(name: bytes, content: bytes) -> bytes:
-        return pack(">I", len(content)) + name + content + pack(">I", zlib.crc32(name + content))
-
-    head = pack(">2I5B", width, height, depth, kind, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
-
-
 def _png_files(out: Path, pictures: Iterable[Picture]) -> int:
     count = 0
     try:
@@ -153,7 +135,7 @@ def _png_files(out: Path, pictures: Iterable[Picture]) -> int:
                 if kind == "depth":
                     pixels = np.minimum(np.rint(pixels * np.float32(1000.0)), DEPTH_MM_MAX)
                 name = f"{camera.robot}.{camera.channel}.{kind}.{tick:09d}.png"
-                (out / name).write_bytes(png(pixels))
+                (out / name).write_bytes(encode_png(pixels))
                 count += 1
     except OSError as error:
         raise Failed(f"{out}: cannot be written, {error.strerror or error}") from None

@@ -1,4 +1,4 @@
-"""Pictures as PNG files (W3C, Portable Network Graphics), depth and segmentation in false colours."""
+"""Pictures as PNG files (W3C, Portable Network Graphics); depth and segmentation also in false colours."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ TURN: Final = 0.6180339887498949
 """The golden section: hues of consecutive numbers differ."""
 
 
-def encode_png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return a picture (height, width, 3) as a file."""
-    height, width, _ = pixels.shape
-    rows = np.zeros((height, 1 + 3 * width), np.uint8)  # a 0 before each row: it is not filtered
-    rows[:, 1:] = pixels.reshape(height, -1)
+def encode_png(pixels: NDArray[Any]) -> bytes:
+    """Return a file of colours (height, width, 3) of 8 bits, or of grey values (height, width) of 16 bits."""
+    height, width = pixels.shape[:2]
+    depth, kind, rows = (8, 2, pixels) if pixels.ndim == 3 else (16, 0, pixels.astype(">u2"))
+    lines = np.ascontiguousarray(rows).view(np.uint8).reshape(height, -1)
+    data = np.pad(lines, ((0, 0), (1, 0)))  # a 0 before each row: it is not filtered
     parts = (
-        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
-        (b"IDAT", zlib.compress(rows, 1)),
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, depth, kind, 0, 0, 0)),
+        (b"IDAT", zlib.compress(data.tobytes(), 3)),
         (b"IEND", b""),
     )
     return HEAD + b"".join(

@@ -10,7 +10,7 @@ from math import isnan
 from typing import Any
 
 from foosim.console.clock.deck import Clock
-from foosim.console.shown.source import About, Answered, Curve, Feed, Moment, Source, Wanted
+from foosim.console.shown.source import About, Answered, Curve, Eyes, Feed, Moment, Source, Wanted
 from foosim.console.shown.tracks import Positions
 
 
@@ -61,6 +61,9 @@ class Leader:
         self.gaps += not (self._is_looked_at and wanted.readers)
         self._is_looked_at = wanted.readers > 0
         self.source.want(wanted)
+
+    def eyes(self) -> Eyes | None:
+        return self.source.eyes()
 
     async def request(self, verb: str, arguments: Mapping[str, Any], who: str) -> Answered:
         return await self.source.request(verb, arguments, who)

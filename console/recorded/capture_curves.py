@@ -124,8 +124,21 @@ def reading_points(
         codec = channel_codec(recording.deployment, robot, channel)
     except UnknownName:
         return []
+    found = sorted(_packets(history, robot, channel, after_ns, until_ns).items())
+    return [(sent_ns // recording.tick_ns, _numbers(codec, payload)) for sent_ns, payload in found]
+
+
+def reading_at(history: CaptureHistory, robot: str, channel: str, tick: int) -> bytes:
+    """Return the payload that a robot sent on a channel at a tick, empty without one. Raises CaptureError."""
+    at_ns = tick * history.recording.tick_ns
+    return _packets(history, robot, channel, at_ns - 1, at_ns).get(at_ns, b"")
+
+
+def _packets(history: CaptureHistory, robot: str, channel: str, after_ns: int, until_ns: int) -> dict[int, bytes]:
+    """Return the payloads that a robot sent on a channel in a time, by the time of sending."""
+    recording = history.recording
     times = recording.index.places[PACKETS].log_ns
-    found: dict[int, list[float]] = {}
+    found: dict[int, bytes] = {}
     first = bisect_right(times, after_ns)
     for number in range(first, min(len(times), bisect_left(times, until_ns + SPREAD_NS))):
         if not after_ns < times[number] <= until_ns:
@@ -135,8 +148,8 @@ def reading_points(
             continue
         row = history.packet(number)
         if row.channel == channel and row.payload:
-            found[row.sent_ns] = _numbers(codec, row.payload)
-    return [(sent_ns // recording.tick_ns, numbers) for sent_ns, numbers in sorted(found.items())]
+            found[row.sent_ns] = row.payload
+    return found
 
 
 def _numbers(codec: PayloadCodec | None, payload: bytes) -> list[float]:

@@ -24,7 +24,7 @@ from foosim.common.errors import BadValue, Refused
 from foosim.common.units import format_ns
 from foosim.console.clock.comparing import Compare, compare
 from foosim.console.clock.deck import ARGUMENTS, VERBS, Clock, Deck, checked
-from foosim.console.recorded.capture_curves import curve_points, reading_points, status_at
+from foosim.console.recorded.capture_curves import curve_points, reading_at, reading_points, status_at
 from foosim.console.recorded.capture_history import CaptureHistory
 from foosim.console.recorded.recording import Look, Recording
 from foosim.console.shown.curves import name_and_unit
@@ -98,7 +98,15 @@ class FileSource:
 
     def eyes(self) -> Eyes | None:
         frame = None if self._look is None else self._look.frame
-        return None if frame is None else (frame.tick, partial(self.recording.drawing.picture, frame))
+        return None if frame is None else (frame.tick, partial(self._picture, frame))
+
+    def _picture(self, frame: Frame, robot: str, channel: str, kind: str) -> bytes:
+        """Return a camera's picture at a frame: that of its packet, as `capture export` has it, where it sent one."""
+        history = self._history
+        payload = (
+            b"" if history is None else self._back.submit(reading_at, history, robot, channel, frame.tick).result()
+        )
+        return self.recording.drawing.picture(frame, robot, channel, kind, payload)
 
     # --- running -----------------------------------------------------------------------------------------------------
 

@@ -308,7 +308,8 @@ class ConsoleServer:
         if eyes is None:
             raise InvalidRequest(f"{source.about.name} has no frame to draw yet")
         tick, draw = eyes
-        picture = await self._loop.run_in_executor(self._drawing, draw, *camera)
+        robot, channel, kind = map(str, camera)
+        picture = await self._loop.run_in_executor(self._drawing, draw, robot, channel, kind)
         text = "data:image/png;base64," + b64encode(picture).decode()
         return {"type": "answer", "accepted": True, "text": "", "picture": text, "tick": tick, "verb": LOOK}
 

@@ -143,8 +143,8 @@ class Drawing:
         values = frame.values
         return Moment(frame.tick, self.poser.poses(values), self.poser.numbers(values), jump, paused)
 
-    def picture(self, frame: Frame, robot: str, channel: str, kind: str) -> bytes:
-        """Return what a camera sees at a frame, as PNG; `kind` is that of a picture.
+    def picture(self, frame: Frame, robot: str, channel: str, kind: str, payload: bytes = b"") -> bytes:
+        """Return the picture of a camera's packet, without one what it sees at a frame, as PNG.
 
         Raises UnknownName without such a camera, BadValue for one of another kind or an absent robot, AssetError.
         """
@@ -154,7 +154,8 @@ class Drawing:
             if key not in known:
                 raise UnknownName("no camera", f"{robot}/{channel}", [f"{one}/{other}" for one, other in known])
             self._cameras[key] = Camera(self.deployment, self.layout, robot, channel)
-        sight = self._cameras[key].at(frame.tick, frame.values.tolist())
+        camera = self._cameras[key]
+        sight = camera.of(payload) if payload else camera.at(frame.tick, frame.numbers)
         if sight is None:
             raise BadValue("its robot is absent", f"{robot}/{channel}")
         return encode_png(visible(kind, sight.picture(kind)))

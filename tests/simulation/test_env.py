@@ -20,6 +20,7 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.loader import load_deployment
 from foosim.library.table.learning.exercises import ENVIRONMENTS
 from foosim.library.table.learning.table_rewards import DefendShot, Goals, score_of, with_ball
+from foosim.rendering.cameras import Camera
 from foosim.simulation.env import FoosimEnv, FoosimParallelEnv, parallel_env
 from foosim.simulation.run import rehearse
 from foosim.simulation.simulation import Simulation, read_for_stepping
@@ -163,6 +164,8 @@ def test_readings_and_commands_are_those_that_are_chosen() -> None:
         ({"bounds": {"*.slide": (1.0, 2.0)}}, BadValue, "blue.attack/position.slide has -0.1185 to 0.1185"),
         ({"agents": []}, BadValue, "one agent or more"),
         ({"seconds": 0.0}, BadValue, "more than 0, 0"),
+        ({"camera": "camera/ball"}, UnknownName, "no camera with images"),
+        ({"camera": "camera/ball", "pixels": (32, 18)}, BadValue, "takes camera or pixels"),
         ({"pixels": (320, 0)}, BadValue, "a width and a height"),
         ({"start": "none.mcap@1s"}, BadBranch, "none.mcap: cannot be read"),
         ({"render_mode": "human"}, BadValue, "no render mode"),
@@ -277,6 +280,20 @@ def test_a_picture_of_the_frame() -> None:
     assert picture.shape == (90, 160, 3) and picture.dtype == np.uint8
     assert (picture[43:48, 77:83].min(axis=2) > 200).any(), "the ball"
     assert picture[45, 95, 1] > picture[45, 95, [0, 2]].max(), "the field"
+    env.close()
+
+
+def test_a_picture_of_a_camera() -> None:
+    lens = "at: {z: 1.2 m}, look_at: {entity: ball}, width: 32, height: 18"
+    eye = f"robots.camera.sensors.eye={{kind: camera, rate: 50 Hz, {lens}}}"
+    env = parallel_env(TABLE, sets=[eye], camera="camera/eye", render_mode="rgb_array")
+    env.reset(seed=1)
+    env.step({})
+    picture, frame = env.render(), env.simulation.frame
+    camera = Camera(env.simulation.deployment, frame.layout, "camera", "eye")
+    sight = camera.at(frame.tick, frame.numbers)
+    assert picture is not None and sight is not None
+    assert picture.shape == (18, 32, 3) and np.array_equal(picture, sight.image()) and picture.std() > 5.0
     env.close()
 
 

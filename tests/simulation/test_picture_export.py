@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
+from base64 import b64encode
 from pathlib import Path
 from typing import Final
 
+import msgspec
 import numpy as np
 import pytest
 from matplotlib.image import imread
@@ -13,14 +16,19 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from foosim.capture.pictures import export_pictures
 from foosim.capture.reader import CaptureData, open_capture
+from foosim.capture.rows import PACKETS
 from foosim.common.errors import BadValue, Failed
+from foosim.console.recorded.capture_source import FileSource
 from foosim.deployment.channel_kinds import channel_codec
 from foosim.rendering.cameras import Camera
+from foosim.rendering.png import encode_png
 from foosim.simulation.run import rehearse
 from foosim.simulation.verify import simulated_again
 from foosim.world.layout import build_layout
+from tests.console.memory import running
 from tests.deployed import TABLE, TEXT
 from tests.looking import LOOKERS
+from tests.simulation.conftest import messages_of, replay, rewritten, with_row
 
 LENS: Final = "width: 64, height: 36, at: {x: 30 cm, z: 1.2 m}, look_at: {entity: ball}"
 EYES: Final = [
@@ -85,6 +93,58 @@ def test_cameras_without_packets_are_drawn_from_frames(capture: CaptureData, tmp
     for tick, (image, _) in drawn(capture).items():
         sight = heard.at(tick, frames[tick].numbers)
         assert sight is not None and np.array_equal(sight.image(), np.array(image)), "as the packet of the tick"
+
+
+def test_the_console_shows_the_picture_of_the_packet_else_that_of_the_frame(
+    capture: CaptureData, tmp_path: Path
+) -> None:
+    """The first packet has another reading than its frame: the last one."""
+    sent, known = capture.packets.where(capture.packets.channel == "eye"), drawn(capture)
+    first = min(known)
+    rows = [
+        with_row(message, payload=b64encode(sent.payload[-1]).decode())
+        if message.topic == PACKETS
+        and b'"eye"' in message.data
+        and message.log_ns == first * capture.deployment.tick_ns
+        else message
+        for message in messages_of(capture.path)
+    ]
+    source = FileSource(rewritten(capture.path, tmp_path / "changed.mcap", rows))
+
+    async def look() -> tuple[bytes, bytes]:
+        async with running(source) as heard:
+            await source.request("seek", {"tick": first}, "me")
+            await heard.until(lambda: heard.tick == first and bool(heard.of("links")))
+            eyes = source.eyes()
+            assert eyes is not None and eyes[0] == first
+            return eyes[1]("camera", "eye", "image"), eyes[1]("camera", "unheard", "image")
+
+    of_packet, of_frame = asyncio.run(look())
+    assert of_packet == encode_png(np.array(known[max(known)][0])) != of_frame
+    assert of_frame == encode_png(np.array(known[first][0]))
+
+
+def test_commands_export_pictures(capture: CaptureData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = drawn(capture)
+    first, *_, last = sorted(known)
+    span = "--from", f"{first * 2 + 1} ms", "--to", f"{last * 2} ms"
+    eye = "--camera", "camera/eye"
+    done = replay("export", capture.path, "--images", "png", *eye, *span, "-o", tmp_path / "png")
+    assert (done.code, done.out) == (0, f"{tmp_path / 'png'}: {2 * len(known) - 2} pictures\n")
+    ticks = {int(path.name.split(".")[3]) for path in (tmp_path / "png").iterdir()}
+    assert ticks == known.keys() - {first}
+    done = replay("export", capture.path, "--images", "mcap", *eye, "--json", "-o", tmp_path / "a.mcap")
+    assert msgspec.json.decode(done.out) == {"path": str(tmp_path / "a.mcap"), "pictures": 2 * len(known)}
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for words, problem in (
+        (("--video", *eye), "a video needs ffmpeg: no such program on PATH; --images png needs none"),
+        (("--images", "png", "--camera", "camera/nose"), "--camera: no such camera, there are camera/between"),
+        (("--images", "png", "--video"), "--images and --video are two exports"),
+        (eye, "--camera, --from and --to are of --images and --video"),
+    ):
+        done = replay("export", capture.path, *words, "-o", tmp_path / "none")
+        assert done.code == 2 - problem.startswith("a video") and problem in done.err, done
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "png"]
 
 
 def test_what_cannot_be_exported_is_refused(
