@@ -165,6 +165,7 @@ def test_the_code_runs(house: Path, capsys: pytest.CaptureFixture[str], name: st
     [
         ("docs/reference/python.md", 0, {}),
         ("docs/reference/python.md", 1, {}),
+        ("docs/reference/python.md", -1, {}),
         ("docs/tutorials/learn_to_defend.md", 0, {"range(20)": "range(2)"}),
     ],
 )

@@ -57,6 +57,10 @@ def export(  # noqa: PLR0913, PLR0917  # a command's options
     if images is not None or video:
         if images is not None and video:
             raise BadValue("--images and --video are two exports", images)
+        if what != "packets" or form is not None:
+            raise BadValue("--what and --format are of tables, not of --images and --video", form or what)
+        if out == STANDARD_OUTPUT:
+            raise BadValue("--out: pictures need a folder or a file", str(out))
         span = time_of("--from", begin) or 0, time_of("--to", end)
         form_of = "video" if video else str(images)
         with reading():
