@@ -62,8 +62,7 @@ def export_pictures(
     Existing, and Failed for a file that cannot be written or without ffmpeg.
     """
     check_absent(out)
-    if form not in FORMS:
-        raise BadValue(f"--images: not one of {', '.join(FORMS)}", form)
+    assert form in FORMS, form
     capture = open_capture(path)
     if form == "video" and list(cameras) == [OVERVIEW]:
         return _overview(capture, out, span_ns)
@@ -71,7 +70,10 @@ def export_pictures(
     found = pictures_of(capture, chosen, span_ns, again)
     if form == "video":
         if len(chosen) != 1:
-            raise BadValue("a video is of one camera: choose it with --camera", [f"{r}/{c}" for r, c in chosen])
+            raise BadValue(
+                "a video is of one camera: choose it with --camera",
+                ", ".join([f"{robot}/{name}" for robot, name in chosen]),
+            )
         ((camera,),) = ([*chosen.values()],)
         frames = (sight.image() for _, _, sight in found)
         return _video(out, frames, camera.settings.width, camera.settings.height, float(camera.settings.rate_hz))

@@ -22,6 +22,7 @@ from foosim.common.errors import BadValue, UnknownName
 from foosim.runtime.command import DONE, FAILED, JsonOption, print_json
 from foosim.simulation.verify import simulated_again
 
+IMAGES = ("png", "mcap")
 _TABLES = ", ".join(table_names())
 
 
@@ -38,7 +39,9 @@ def export(  # noqa: PLR0913, PLR0917  # a command's options
     video: Annotated[bool, typer.Option("--video", help="Write a video of one camera, by ffmpeg.")] = False,
     camera: Annotated[
         list[str] | None,
-        typer.Option(help="ROBOT/CHANNEL of cameras, with * and ?; overview: the whole world. May be repeated."),
+        typer.Option(
+            help="ROBOT/CHANNEL of cameras, with * and ?; may be repeated. overview, with --video: the world."
+        ),
     ] = None,
     begin: Annotated[str | None, typer.Option("--from", help="Time of the first picture, e.g. 10s.")] = None,
     end: Annotated[str | None, typer.Option("--to", help="Time of the last picture, e.g. 20s.")] = None,
@@ -61,7 +64,11 @@ def export(  # noqa: PLR0913, PLR0917  # a command's options
             raise BadValue("--what and --format are of tables, not of --images and --video", form or what)
         if out == STANDARD_OUTPUT:
             raise BadValue("--out: pictures need a folder or a file", str(out))
-        span = time_of("--from", begin) or 0, time_of("--to", end)
+        if images is not None and images not in IMAGES:
+            raise UnknownName("--images: not a kind of pictures", images, IMAGES)
+        first_ns, last_ns = span = time_of("--from", begin) or 0, time_of("--to", end)
+        if last_ns is not None and last_ns < first_ns:
+            raise BadValue("--to is before --from", f"{end} and {begin}")
         form_of = "video" if video else str(images)
         with reading():
             count = export_pictures(capture, out, form_of, camera or ["*"], span, simulated_again)
@@ -71,7 +78,8 @@ def export(  # noqa: PLR0913, PLR0917  # a command's options
             typer.echo(f"{out}: {count} pictures")
         return
     if camera or begin or end:
-        raise BadValue("--camera, --from and --to are of --images and --video", camera or begin or end)
+        given = ", ".join(filter(None, [*(camera or []), begin, end]))
+        raise BadValue("--camera, --from and --to are of --images and --video", given)
     with reading():
         done = export_capture(capture, what, out, _format(form))
     if json:

@@ -69,6 +69,9 @@ class _Shown:
         if render_mode is not None and render_mode not in RENDER_MODES:
             episodes.close()
             raise BadValue(f"no render mode (there is {', '.join(RENDER_MODES)})", render_mode)
+        if render_mode is None and episodes.camera is not None:
+            episodes.close()
+            raise BadValue("a camera is rendered with render_mode='rgb_array'", episodes.camera)
         self._episodes, self.render_mode = episodes, render_mode
         return {"render_fps": episodes.rate_hz}
 

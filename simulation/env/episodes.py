@@ -139,7 +139,7 @@ class Episodes:
         try:
             for name, agent in simulation.agents.items():
                 self.vectors[name] = _vectors(declared, agent, readings, commands, bounds or {}, ages)
-                self.looks[name] = Looks(agent, pictures)
+                self.looks[name] = Looks(agent, [pictures] if isinstance(pictures, str) else pictures)
             robots = {
                 name: tuple(dict.fromkeys(column.robot for column in commands.columns))
                 for name, (_, commands) in self.vectors.items()
@@ -152,7 +152,7 @@ class Episodes:
         """By (robot, actuator) with jobs: the agent that gives them, and the jobs."""
         self._seed: int | None = None
         self._episode = self._steps = 0
-        self._pixels, self._camera = pixels or PIXELS, camera
+        self._pixels, self.camera = pixels or PIXELS, camera
         self._eye: Camera | Overview | None = None
         self.is_running = False
 
@@ -277,8 +277,8 @@ class Episodes:
         simulation, frame = self.simulation, self.simulation.frame
         if self._eye is None:
             spec, layout = simulation.deployment, frame.layout
-            robot, _, channel = (self._camera or "").partition("/")
-            above = self._camera is None
+            robot, _, channel = (self.camera or "").partition("/")
+            above = self.camera is None
             self._eye = (
                 Overview(spec, layout, *self._pixels, is_above=True) if above else Camera(spec, layout, robot, channel)
             )

@@ -152,7 +152,6 @@ def test_what_cannot_be_exported_is_refused(
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     for form, cameras, problem in (
-        ("gif", ["*"], "not one of png, mcap, video"),
         ("png", ["camera/nose"], "no such camera, there are camera/between, camera/eye, camera/unheard"),
         ("video", ["*"], "a video is of one camera"),
     ):
