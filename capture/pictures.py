@@ -9,7 +9,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -233,10 +233,11 @@ def _video(out: Path, frames: Iterable[NDArray[np.uint8]], width: int, height: i
         command = [program, "-loglevel", "error", "-y", *given, *even, "-f", kind, str(part)]
         process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.PIPE))
         assert process.stdin is not None
-        for frame in frames:
-            process.stdin.write(frame.tobytes())
-            count += 1
-        process.stdin.close()
+        with suppress(BrokenPipeError):  # it has ended: its exit code decides
+            for frame in frames:
+                process.stdin.write(frame.tobytes())
+                count += 1
+            process.stdin.close()
         if process.wait():
             raise Failed(f"{out}: ffmpeg ended with exit code {process.returncode}")
     return count

@@ -229,7 +229,7 @@ def parallel_env(deployment: Deployment | str | Path = TABLE, **arguments: Any) 
     * `ages`: whether the age of each reading (s) is observed, too; -1 before the first.
     * `pictures`: globs of `robot/channel` that select among the cameras that agents hear, by default none. With some,
       an observation is a mapping: `readings` are the vector, and each picture is under `robot/channel.image`, `.depth`
-      or `.segmentation`; all zeros before the first.
+      or `.segmentation`; all zeros before the first, and of one that the network has changed.
     * `sets`: changes of the file's values, as `--set` makes them.
     * `pixels`: width and height of what `render` returns (320, 180), the world from straight above; or
       `camera`: the camera, `robot/channel`, whose pictures it returns.

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.client.vectors import Pair, chosen
-from foosim.common.errors import UnknownName
+from foosim.common.errors import Malformed, UnknownName
 from foosim.rendering.pictures import Pictures, PictureShape
 from foosim.simulation.agents import Agent
 
@@ -37,7 +38,8 @@ class Looks:
                 self._pairs.append((name, pair, kind))
 
     def with_readings(self, readings: NDArray[np.float64]) -> Observation:
-        """Return the observation: the newest pictures, all zeros before the first one."""
+        """Return the observation: the newest pictures, all zeros before the first one and of one that the network has
+        changed."""
         if not self.shapes:
             return readings
         found: dict[str, NDArray[Any]] = {READINGS: readings}
@@ -45,5 +47,8 @@ class Looks:
             packet, codec = self._agent.newest.get(pair), self._agent.channels[pair].codec
             assert codec is not None
             size, form, _ = self.shapes[name]
-            found[name] = np.zeros(size, form) if packet is None else codec.decode(packet.payload).picture(kind)
+            found[name] = np.zeros(size, form)
+            if packet is not None:
+                with suppress(Malformed):
+                    found[name] = codec.decode(packet.payload).picture(kind)
         return found

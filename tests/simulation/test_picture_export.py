@@ -164,3 +164,6 @@ def test_what_cannot_be_exported_is_refused(
     (tmp_path / "ffmpeg").chmod(0o755)
     count = export_pictures(capture.path, tmp_path / "v.mp4", "video", ["camera/eye"], ALL, simulated_again)
     assert (tmp_path / "v.mp4").stat().st_size == count * 64 * 36 * 3
+    (tmp_path / "ffmpeg").write_text("#!/bin/sh\nexit 3\n")
+    with pytest.raises(Failed, match=r"bad\.mp4: ffmpeg ended with exit code 3"):
+        export_pictures(capture.path, tmp_path / "bad.mp4", "video", ["overview"], ALL, simulated_again)

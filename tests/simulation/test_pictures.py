@@ -40,6 +40,15 @@ def test_pictures_are_equal_live_and_from_captures_on_any_number_of_nodes(tmp_pa
     assert live[0].items() <= {tick: sha256(image.tobytes()).hexdigest() for tick, image in seen.items()}.items()
 
 
+def test_an_environment_observes_zeros_of_a_picture_that_the_network_has_changed() -> None:
+    corrupt = "network.links.everything.corrupt={bit_error_rate: 1 %, deliver: true}"
+    env = FoosimEnv(TABLE, sets=[EYE, LOOKERS, corrupt], pictures=["camera/eye"], network=True)
+    env.reset()
+    seen = [bool(env.step(np.zeros(len(env.columns[1])))[0]["camera/eye.image"].any()) for _ in range(12)]
+    assert ("camera", "eye") in env.simulation.agents["waver"].newest and not any(seen)
+    env.close()
+
+
 def test_an_environment_observes_pictures() -> None:
     env = FoosimEnv(TABLE, sets=[EYE, LOOKERS], pictures=["camera/eye"])
     assert isinstance(env.observation_space, spaces.Dict)
