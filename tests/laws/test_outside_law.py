@@ -191,6 +191,7 @@ def lies_to_the_hub(system: System) -> list[Lie]:
         (channels.UP, "player-blue", Up("player-red", "boot", [command])),
         (channels.UP, "player-red", Done("player-red", "boot", FAR, [command])),
         (channels.UP, NOBODY, Up(NOBODY, "boot", [command])),
+        (channels.CLIENT_FETCH, "player-red", Fetch("player-red", "other", bytes(32), 0)),
     ]
     return [(VHUB, *lie) for lie in said]
 
@@ -249,6 +250,7 @@ def lies(system: System) -> list[Lie]:
         *((who, channels.WANT, NOBODY, stranger) for who in ("n1", VHUB, SUPERVISOR)),
         *((who, channels.WANT, NOBODY, replace(stranger, sender="n1")) for who in ("n1", VHUB, SUPERVISOR)),
         ("player-red", channels.CLIENT_WELCOME, "player-red", welcome),
+        ("player-red", channels.CLIENT_PIECE, "player-red", Piece("player-red", "boot", bytes(32), 0, 5, b"false")),
         ("player-red", channels.DOWN, "player-red", Go(0, FAR, 0, [])),
     ]
 
