@@ -97,7 +97,7 @@ class Replay:
     @property
     def dropped(self) -> int:
         """How many messages were lost because they were not taken in time."""
-        return self._inbox.statistics().dropped
+        return self._inbox.dropped
 
     def captured_link(self, link: str) -> str:
         """Return the captured name of a link: bodies may be played under others."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -49,19 +48,6 @@ from foosim.world.components.view import ComponentError
 from foosim.world.frame import Frame
 from foosim.world.layout import Entity, Layout
 from foosim.world.robot_packets import Outbox
-
-
-@dataclass(frozen=True, slots=True)
-class NodeStatistics:
-    """The counters of a node."""
-
-    tick: int
-    epoch: int
-    solved_ticks: int
-    refused: int
-    repeated: int
-    diverged: int
-    held: int
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -109,7 +95,7 @@ class NodeCore:
         self._retry = RetryTimer(now_ns)
         self._not_finite: set[str] = set()
         """Readings that were logged as not finite."""
-        self._solved_ticks = self._refused = self._repeated = self._diverged = 0
+        self._solved_ticks = self.refused = self.repeated = 0
         self._readers: dict[str, Callable[[Any, bytes, int], None]] = {
             channels.ORDER.name: self._on_order,
             channels.DELIVERIES.name: self._on_deliveries,
@@ -129,7 +115,7 @@ class NodeCore:
         """Take one message as it came; an invalid one is counted and dropped."""
         try:
             if channel is channels.REFUSAL:
-                self._repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
+                self.repeated += not self.member.refuse(self.refusals.read(channel, name, payload, now_ns))
                 return
             if channel.name not in self._readers:
                 raise Malformed(f"a node does not read the channel {channel.name}")
@@ -139,7 +125,7 @@ class NodeCore:
         except NotValidHere as error:
             self.failure = error.what
         except Malformed as error:
-            self._refused += 1
+            self.refused += 1
             self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
@@ -236,11 +222,6 @@ class NodeCore:
         if self._term is not None:
             self._term = self._make_term()
 
-    def statistics(self) -> NodeStatistics:
-        tick = self.frame.tick if self.frame is not None else 0
-        counts = self._solved_ticks, self._refused, self._repeated, self._diverged, len(self._pending)
-        return NodeStatistics(tick, self.epoch, *counts)
-
     @property
     def lacking(self) -> tuple[Channel, int] | None:
         """The channel, and the number of its messages, that the tick waits for; None without a tick."""
@@ -313,7 +294,7 @@ class NodeCore:
         try:
             frame = barrier.assemble()
         except BadParts as bad:
-            self._refused += 1
+            self.refused += 1
             self.actions.append(Log("error", f"{bad}: requested again"))
             barrier.drop(node for node in bad.nodes if node != self.name)
             return False
@@ -322,13 +303,12 @@ class NodeCore:
 
     def _take_part(self, barrier: Barrier, part: Part) -> None:
         if part.input_digest != self._input_digest:
-            self._diverged += 1
             self.actions.append(Log("error", f"part {part.tick} of {part.node} has another input digest: kept"))
             return
         try:
             barrier.add(part)
         except Malformed as error:
-            self._refused += 1
+            self.refused += 1
             self.actions.append(Log("error", str(error)))
 
     def _enter(self, frame: Frame, now_ns: int) -> None:
@@ -352,25 +332,25 @@ class NodeCore:
         if message.epoch >= self.epoch:
             self._pending.add(channel, message.node if isinstance(message, Part) else channels.SUPERVISOR, payload)
         else:
-            self._repeated += 1
+            self.repeated += 1
         return True
 
     def _on_order(self, order: Order, payload: bytes, now_ns: int) -> None:
         if self._fenced(channels.ORDER, order, payload):
             return
         if self.frame is None or not self._inputs.take_order(order, self.frame.tick):
-            self._repeated += 1
+            self.repeated += 1
 
     def _on_deliveries(self, deliveries: Deliveries, payload: bytes, now_ns: int) -> None:
         own_tick = self.member.first_tick if self.frame is None else self.frame.tick
         if not self._inputs.take_deliveries(deliveries, payload, own_tick):
-            self._repeated += 1
+            self.repeated += 1
 
     def _on_part(self, part: Part, payload: bytes, now_ns: int) -> None:
         if self._fenced(channels.PART, part, payload):
             return
         if self.frame is None or part.tick <= self.frame.tick:
-            self._repeated += 1
+            self.repeated += 1
             return
         check_near(part.tick, self.frame.tick)
         if part.node not in self.roster or part.node == self.name:
@@ -421,18 +401,18 @@ class NodeCore:
 
     def _on_build(self, build: Build | Piece, payload: bytes, now_ns: int) -> None:
         if not self.member.take_build(build):
-            self._repeated += not self.member.is_fetching
+            self.repeated += not self.member.is_fetching
             return
         self.deployment = self.member.deployment
         if self.member.simulation:
             self.member.ready()
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:
-        self._repeated += not self.member.recall(recall)
+        self.repeated += not self.member.recall(recall)
 
     def _on_epoch(self, epoch: Epoch, payload: bytes, now_ns: int) -> None:
         if epoch.epoch <= self.epoch or self.deployment is None:
-            self._repeated += 1
+            self.repeated += 1
             self.member.repeated(epoch.epoch == self.epoch and self.name in epoch.roster)
             return
         self.member.check_epoch(epoch)
@@ -479,7 +459,7 @@ class NodeCore:
             return
         epoch = self._awaited_epoch
         if epoch is None or commit.tick != epoch.tick or commit.digest != epoch.digest:
-            self._repeated += 1
+            self.repeated += 1
             return
         assert self.member.layout is not None
         self._resume(committed_frame(commit, self.member.layout), now_ns)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from typing import Any, Final, get_args
 
 from foosim.common import limits
@@ -26,10 +27,8 @@ class Plane(Enum):
 
 @dataclass(frozen=True)
 class Channel:
-    """One row of the table. Messages of an `express` channel are sent at once, unbatched.
-
-    A `blocking` channel holds its writer when a reader is slow; another one drops messages for a slow reader.
-    """
+    """One row of the table. A `blocking` channel holds its writer when a reader is slow; another one drops messages for
+    it."""
 
     name: str
     key: str
@@ -38,9 +37,8 @@ class Channel:
     writers: str
     readers: str
     rate: str
-    express: bool
-    bytes_max: int = limits.MESSAGE_BYTES_MAX
-    blocking: bool = True
+    bytes_max: int
+    blocking: bool
 
     def key_for(self, name: str) -> str:
         """Return the key for one sender or receiver."""
@@ -52,7 +50,8 @@ class Channel:
         return self.key.replace("{name}", "*")
 
 
-def _simulation(
+def _channel(  # noqa: PLR0913, PLR0917  # the columns of the table
+    plane: Plane,
     name: str,
     message: Any,
     writers: str,
@@ -62,30 +61,13 @@ def _simulation(
     bytes_max: int = limits.MESSAGE_BYTES_MAX,
     blocking: bool = True,
 ) -> Channel:
-    key = f"foosim/simulation/{name}" + ("/{name}" if named else "")
-    return Channel(name, key, message, Plane.SIMULATION, writers, readers, rate, True, bytes_max, blocking)
+    key = f"foosim/{plane.name.lower()}/{name}" + ("/{name}" if named else "")
+    return Channel(name, key, message, plane, writers, readers, rate, bytes_max, blocking)
 
 
-def _radio(
-    name: str,
-    message: Any,
-    writers: str,
-    readers: str,
-    rate: str,
-    bytes_max: int = limits.RADIO_MESSAGE_BYTES_MAX,
-    blocking: bool = True,
-) -> Channel:
-    key = f"foosim/radio/{name}/{{name}}"
-    return Channel(name, key, message, Plane.RADIO, writers, readers, rate, True, bytes_max, blocking)
-
-
-def _replay(
-    name: str, message: Any, writers: str, readers: str, rate: str, bytes_max: int = limits.MESSAGE_BYTES_MAX
-) -> Channel:
-    key = f"foosim/replay/{name}/{{name}}"
-    return Channel(name, key, message, Plane.REPLAY, writers, readers, rate, True, bytes_max)
-
-
+_simulation: Final = partial(_channel, Plane.SIMULATION)
+_radio: Final = partial(_channel, Plane.RADIO, bytes_max=limits.RADIO_MESSAGE_BYTES_MAX)
+_replay: Final = partial(_channel, Plane.REPLAY)
 _SMALL: Final = limits.SMALL_MESSAGE_BYTES_MAX
 
 HELLO: Final = _simulation("hello", messages.Hello, "node, vhub", "supervisor", "5 Hz until answered", bytes_max=_SMALL)
@@ -187,11 +169,7 @@ VHUB_WAITS: Final[tuple[Channel, ...]] = (COMMIT, SAMPLES, UP)
 CLIENT_WAITS: Final[tuple[Channel, ...]] = (DOWN,)
 """The channels with messages at every tick, by role: it waits in the queue of the missing one."""
 
-ALIVE: Final = {
-    Plane.SIMULATION: "foosim/simulation/alive/{name}",
-    Plane.RADIO: "foosim/radio/alive/{name}",
-    Plane.REPLAY: "foosim/replay/alive/{name}",
-}
+ALIVE: Final = {plane: f"foosim/{plane.name.lower()}/alive/{{name}}" for plane in Plane}
 """Liveliness tokens: presence shows that a process and its link are up, not that it advances."""
 
 VHUB: Final = "vhub"

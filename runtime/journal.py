@@ -148,16 +148,6 @@ class JournalDamaged(JournalError):
         self.path, self.byte, self.records = path, byte, records
 
 
-@dataclass(frozen=True, slots=True)
-class JournalStatistics:
-    """The counts of a journal since it was opened: its writes and files."""
-
-    records: int
-    bytes: int
-    files: int
-    syncs: int
-
-
 def journal_files(folder: Path, stem: str) -> list[Path]:
     """Return the files of a journal, oldest first; there may be none."""
     return [path for _, path in _numbered(folder, stem)]
@@ -337,14 +327,13 @@ class Journal:
         self.stem = stem
         self._bytes_max = bytes_max
         self._sync_every_s = sync_every_s
-        self._records = self._bytes = self._syncs = 0
         self._error: JournalError | None = None
         self._lock_file = self._lock()
         self._closed_files: list[tuple[int, int]] = []
         """Serial and last tick of files that are full, oldest first."""
         self._serial = max((serial for serial, _ in _numbered(folder, stem)), default=0)
         self._mutex = threading.Lock()
-        """Guards the data shared with the syncing thread: `_file`, `_retired`, dirty bytes, `_syncs`."""
+        """Guards the data shared with the syncing thread: `_file`, `_retired`, dirty bytes."""
         self._retired: list[int] = []
         self._dirty = self._folder_dirty = False
         self._file = self._size = 0
@@ -369,7 +358,6 @@ class Journal:
             raise self._error
         start = b"" if self._size else self._head.pack()
         self._write(start + pack_record(self._head, self._size + len(start), self._synced, record))
-        self._records += 1
 
     def rotate_if_full(self, head: Callable[[], bytes], tick: int) -> bool:
         """Begin a new file with the record `head()` if this one is full; return whether it was.
@@ -398,11 +386,6 @@ class Journal:
                     path.unlink(missing_ok=True)
         except OSError as error:
             raise self._failed("cannot remove a file that is done with", error) from None
-
-    def statistics(self) -> JournalStatistics:
-        with self._mutex:
-            syncs = self._syncs
-        return JournalStatistics(self._records, self._bytes, len(journal_files(self.folder, self.stem)), syncs)
 
     @property
     def path(self) -> Path:
@@ -471,7 +454,6 @@ class Journal:
                 os.ftruncate(self._file, self._size)
             raise failure from None
         self._size += written
-        self._bytes += written
         self._dirty = True  # before the syncing thread can see how far it is
         self._written = self._serial, self._size
 
@@ -493,7 +475,6 @@ class Journal:
             retired, self._retired = self._retired, []
             dirty = retired if not self._dirty or self._file in retired else [*retired, self._file]
             folder_dirty, self._dirty, self._folder_dirty = self._folder_dirty, False, False
-            self._syncs += 1 if dirty else 0
         try:
             for file in dirty:
                 os.fdatasync(file)

@@ -48,7 +48,7 @@ from foosim.supervisor.records import CommitRecord, History, Recovered, Solved, 
 from foosim.supervisor.requests import Requests
 from foosim.supervisor.settings import RunSettings
 from foosim.supervisor.state import RunState
-from foosim.supervisor.status import SupervisorStatistics, result, status
+from foosim.supervisor.status import result, status
 from foosim.supervisor.vhub_loss import PlayerLosses, VhubLoss
 from foosim.supervisor.viewing import Viewing
 from foosim.world.assembly.presence import Presence
@@ -90,7 +90,7 @@ class SupervisorCore:
         self._slots = Slots(state.frame.layout, state.owners)
         self._presence = Presence(state.frame.layout)
         self._retry = RetryTimer(now_ns)
-        self._refused = self._diverged = 0
+        self.refused = 0
         self._readers: dict[type[Any], Callable[[Any, bytes, int], None]] = {
             Hello: self.handshake.on_hello,
             Fetch: self.handshake.on_fetch,
@@ -119,7 +119,7 @@ class SupervisorCore:
                 raise Malformed(f"the supervisor does not read the channel {channel.name}")
             reader(message, payload, now_ns)
         except Malformed as error:
-            self._refused += 1
+            self.refused += 1
             self.refusals.refuse(channel, name, payload, error, now_ns)
 
     def advance(self, now_ns: int) -> None:
@@ -241,12 +241,6 @@ class SupervisorCore:
         state.journal(state.control())
         return state.stop_at
 
-    def statistics(self) -> SupervisorStatistics:
-        state, refusals = self.state, (self._refused, self.state.repeated, self._diverged)
-        return SupervisorStatistics(
-            state.frame.tick, state.epoch, state.account.moves, state.account.handovers, *refusals
-        )
-
     def status(self, now_ns: int) -> dict[str, Any]:
         """Return the state of the run for people and scripts."""
         vhub_lost = self.vhub_loss.as_json(now_ns) if self.state.roster.is_hub_away else None
@@ -305,7 +299,6 @@ class SupervisorCore:
         digest = input_digest_of(state.frame.digest, edits, deliveries)
         diverged = [part.node for part in parts if part.input_digest != digest]
         if diverged:
-            self._diverged += len(diverged)
             why = f"has diverged: its part {tick + 1} has another input digest"
             if len(diverged) == len(parts):
                 self.fail("; ".join(f"node {node} {why}" for node in diverged))
@@ -316,7 +309,7 @@ class SupervisorCore:
             barrier.add_all(parts)
             frame = barrier.assemble()
         except BadParts as bad:
-            self._refused += len(bad.nodes)
+            self.refused += len(bad.nodes)
             state.log("error", f"{bad}: requested again")
             inputs.drop(tick + 1, bad.nodes)
             return False

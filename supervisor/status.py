@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from msgspec.structs import asdict
 
@@ -16,23 +15,6 @@ from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.state import RunState
 from foosim.world.assembly.world import world_status, world_texts
 from foosim.world.frame import Frame
-
-
-@dataclass(frozen=True, slots=True)
-class SupervisorStatistics:
-    """Counts of a supervisor so far."""
-
-    tick: int
-    epoch: int
-    moves: int
-    handovers: int
-    refused: int
-    repeated: int
-    diverged: int
-
-
-DISRUPTIONS_SHOWN: Final = 16
-"""The last requested events of the network that a status has."""
 
 
 def in_quarantine(frame: Frame) -> list[str]:

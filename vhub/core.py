@@ -74,7 +74,7 @@ from foosim.vhub.state.records import (
     world_packets,
 )
 from foosim.vhub.state.resume import Past
-from foosim.vhub.status import HubStatistics, LinkLines, ShellStatus, report, statistics
+from foosim.vhub.status import LinkLines, ShellStatus, report
 from foosim.vhub.wait_times import WaitTimes
 from foosim.vhub.watching import WatchList
 from foosim.world.assembly.initial_state import first_chain
@@ -166,7 +166,7 @@ class HubCore:
         self.shell = ShellStatus()
         self.link_lines, self.watching = LinkLines(), WatchList()
         self.busy = 0.0
-        self.epoch = self._epoch_tick = self._end_ns = self._malformed = self._repeated = 0
+        self.epoch = self._epoch_tick = self._end_ns = self.malformed = self._repeated = 0
         self.epoch_payload = b""
         self._owners: dict[str, str] = {}
         self._unrecorded: deque[Closing] = deque()
@@ -219,7 +219,7 @@ class HubCore:
         except NotValidHere as error:
             self.lost = self.lost or error.what
         except Refused as error:
-            self._malformed += 1
+            self.malformed += 1
             if channel.plane is channels.Plane.RADIO and self.state is not None:
                 self.state.reject_on_receipt("malformed")
             self.refusals.refuse(channel, name, payload, error, now_ns)
@@ -306,9 +306,6 @@ class HubCore:
     def repeated(self) -> int:
         """Messages that came twice or too late."""
         return self._repeated + self.clients.repeated
-
-    def statistics(self) -> HubStatistics:
-        return statistics(self.state, self._malformed, self.repeated)
 
     @property
     def lacking(self) -> tuple[Channel, int]:

@@ -344,7 +344,8 @@ class HubShell:
 
     def _on_log(self, log: Log) -> None:
         if self._capture is not None and not self.core.is_closing:
-            self._write(self._capture.log, log.level, log.text, self.core.statistics().closed + 1)
+            closed = -1 if self.core.state is None else self.core.state.closed
+            self._write(self._capture.log, log.level, log.text, closed + 1)
 
     def _write(self, put: Callable[..., None], *arguments: Any) -> None:
         """Hand something to the capture, which ends, and the run with it, where a body cannot be drawn."""

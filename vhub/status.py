@@ -29,28 +29,6 @@ class ShellStatus:
     radio_address: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class HubStatistics:
-    """The vHub's statistics up to now."""
-
-    closed: int
-    offered: int
-    delivered: int
-    dropped: int
-    in_flight: int
-    refused: int
-    malformed: int
-    repeated: int
-
-
-def statistics(state: HubState | None, malformed: int, repeated: int) -> HubStatistics:
-    """Return the statistics up to now."""
-    if state is None:
-        return HubStatistics(-1, 0, 0, 0, 0, 0, malformed, repeated)
-    p = state.packets
-    return HubStatistics(state.closed, p.offered, p.delivered, p.dropped, p.in_flight, p.refused, malformed, repeated)
-
-
 class LinkLines:
     """The lines of links, which several heartbeats share: for hundreds of links they cost as much as a few ticks."""
 

@@ -76,7 +76,7 @@ class Wire:
         key = channel.key_for(name)
         publisher = self._publishers.get(key)
         if publisher is None:
-            publisher = self._publishers[key] = self.session.publisher(key, channel.express, channel.blocking)
+            publisher = self._publishers[key] = self.session.publisher(key, channel.blocking)
         publisher.put(payload)
 
     def declare_alive(self) -> None:

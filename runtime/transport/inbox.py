@@ -15,7 +15,6 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final, Protocol
 
 Item = tuple[str, str, bytes]
@@ -40,15 +39,6 @@ class Source(Protocol):
         """End a wait, from another thread."""
 
 
-@dataclass(frozen=True, slots=True)
-class InboxStatistics:
-    """Numbers of items: taken by the reader, dropped by a full inbox, and the most at one time."""
-
-    taken: int
-    dropped: int
-    high_water: int
-
-
 class Inbox:
     """Items from many threads for one reader. A full inbox drops the newest item and counts it."""
 
@@ -66,15 +56,14 @@ class Inbox:
         """The source in which the reader waits, or waited last, and for how many messages."""
         self._count = 1
         self._alarm: _Alarm | None = None
-        self._taken = 0
-        self._dropped = 0
-        self._high_water = 0
+        self.dropped = 0
+        """How many items a full inbox has dropped."""
 
     def offer(self, item: Item) -> bool:
         """Add an item, from any thread; False when the inbox is full and the item is lost."""
         with self._guard:
             if len(self._items) >= self.limit:
-                self._dropped += 1
+                self.dropped += 1
                 return False
             self._items.append(item)
         self._ring()
@@ -134,10 +123,6 @@ class Inbox:
         if source is not None:
             source.ring()
 
-    def statistics(self) -> InboxStatistics:
-        """Return the account so far."""
-        return InboxStatistics(self._taken, self._dropped, self._high_water)
-
     def _ring(self) -> None:
         """End a wait. A surplus ring only wakes the reader once more."""
         if not self._waiting:
@@ -168,14 +153,10 @@ class Inbox:
                 offered, self._items = self._items, []
             items = items + offered if items else offered
         count = len(items)
-        if count > self._high_water:
-            self._high_water = min(count, self.limit)
-            if count > self.limit:
-                with self._guard:
-                    self._dropped += count - self.limit
-                del items[self.limit :]
-                count = self.limit
-        self._taken += count
+        if count > self.limit:
+            with self._guard:
+                self.dropped += count - self.limit
+            del items[self.limit :]
         return items
 
 

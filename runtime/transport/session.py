@@ -20,7 +20,6 @@ import threading
 import time
 import weakref
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
 from itertools import chain, repeat
 from types import TracebackType
 from typing import Any, Final, Self
@@ -74,15 +73,7 @@ def use_client_runtime() -> None:
     _runtime = CLIENT_RUNTIME
 
 
-@dataclass(frozen=True, slots=True)
-class SessionStatistics:
-    """Messages published, messages received, keys refused, errors in receiving threads, and the text of one of them."""
-
-    sent: int
-    received: int
-    refused: int
-    errors: int
-    error: str
+Publisher = zenoh.Publisher
 
 
 class _Attempt:
@@ -132,25 +123,6 @@ class _Attempt:
             _discard(self._outcome.get_nowait())
 
 
-class Publisher:
-    """Puts payloads on one key."""
-
-    def __init__(self, declared: zenoh.Publisher) -> None:
-        self.sent = 0
-        self._declared = declared
-        self._put = declared.put
-        self._pid = os.getpid()
-
-    def put(self, payload: bytes) -> None:
-        """Publish. A stuck reader blocks a blocking publisher for at most half a second; a loss is not reported."""
-        assert os.getpid() == self._pid, "a session does not survive a fork: spawn processes"
-        self._put(payload)
-        self.sent += 1
-
-    def undeclare(self) -> None:
-        self._declared.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stubs name no result
-
-
 class Session:
     """One session of a process. Use it in `with`; its declarations live as long as it does."""
 
@@ -163,8 +135,7 @@ class Session:
         self._session = session
         self.pid: Final = os.getpid()
         self._closed = False
-        self._publishers: list[Publisher] = []
-        self._receivers: list[_Receiver] = []
+        self.receivers: Final[list[_Receiver]] = []
         self._threads: list[threading.Thread] = []
         self._inboxes: list[Inbox] = []
         self._declared: list[Any] = []
@@ -228,22 +199,22 @@ class Session:
             return cls(session, str(address))
         raise ConnectError(f"gave up before a router answered at {address}")
 
-    def publisher(self, key: str, express: bool = True, blocking: bool = True) -> Publisher:
-        """Return a publisher on one key, which does not reach subscribers of this session.
+    def publisher(self, key: str, blocking: bool = True) -> Publisher:
+        """Return a publisher on one key, without batching, which does not reach subscribers of this session.
 
-        `express`: sent at once, without batching. `blocking`: a slow reader holds the sender; otherwise a message that
-        cannot be sent within 1 ms is lost.
+        `blocking`: a slow reader holds the sender, for at most half a second; otherwise a message that cannot be sent
+        within 1 ms is lost. No loss is reported.
         """
         self._check()
         declared = self._session.declare_publisher(
             key,
             congestion_control=zenoh.CongestionControl.BLOCK if blocking else zenoh.CongestionControl.DROP,
-            express=express,
+            express=True,
             reliability=zenoh.Reliability.RELIABLE,
             allowed_destination=zenoh.Locality.REMOTE,
         )
-        self._publishers.append(Publisher(declared))
-        return self._publishers[-1]
+        self._declared.append(declared)
+        return declared
 
     def subscribe(self, key_expr: str, channel: str, inbox: Inbox) -> None:
         """Offer messages on these keys to the inbox as (channel, last chunk of the key, payload)."""
@@ -263,7 +234,7 @@ class Session:
         bell = self._session.declare_publisher(key, express=True, allowed_destination=zenoh.Locality.SESSION_LOCAL)
         self._declared += [subscriber, bell]
         source = _Source(subscriber.handler, read_key, key, bell, inbox.limit)
-        self._receivers.append(source)
+        self.receivers.append(source)
         self._inboxes.append(inbox)
         inbox.attach(source, channel)
 
@@ -293,16 +264,6 @@ class Session:
         replies = self._session.liveliness().get(key_expr, timeout=QUERY_S)
         return {_name(str(reply.ok.key_expr)) for reply in replies if reply.ok is not None}
 
-    def statistics(self) -> SessionStatistics:
-        """Return the account so far."""
-        return SessionStatistics(
-            sum(publisher.sent for publisher in self._publishers),
-            sum(receiver.received for receiver in self._receivers),
-            sum(receiver.refused for receiver in self._receivers),
-            sum(receiver.errors for receiver in self._receivers),
-            next((receiver.error for receiver in self._receivers if receiver.error), ""),
-        )
-
     def close(self) -> bool:
         """Undeclare everything and close; False when that takes more than `CLOSE_S` and continues in the background."""
         assert os.getpid() == self.pid, "a session does not survive a fork: spawn processes"
@@ -322,7 +283,7 @@ class Session:
         self.close()
 
     def _close(self) -> None:
-        for declared in (*self._publishers, *self._declared, *self._tokens.values()):
+        for declared in (*self._declared, *self._tokens.values()):
             # Undeclared already, or borrowed by a thread that puts at this moment: then the session's close ends it.
             with contextlib.suppress(zenoh.ZError, RuntimeError):
                 declared.undeclare()
@@ -337,7 +298,7 @@ class Session:
     def _drain(self, subscriber: Any, channel: str, inbox: Inbox, content: Callable[[zenoh.Sample], bytes]) -> None:
         drain = _Drain(subscriber.handler, channel, inbox, content)
         self._declared.append(subscriber)
-        self._receivers.append(drain)
+        self.receivers.append(drain)
         thread = threading.Thread(target=drain.run, name=f"receive {channel}", daemon=True)
         self._threads.append(thread)
         thread.start()
@@ -351,7 +312,6 @@ class _Receiver:
     """The counters of a receiving thread."""
 
     def __init__(self, handler: Any) -> None:
-        self.received = 0
         self.refused = 0
         self.errors = 0
         self.error = ""
@@ -366,7 +326,7 @@ class _Receiver:
         return key
 
     def _count_error(self, error: Exception) -> None:
-        """Keep an error for the statistics: raised, it would end the thread and silence its channel."""
+        """Keep the first error, and count the others: raised, it would end the thread and silence its channel."""
         self.errors += 1
         self.error = self.error or show(f"{type(error).__name__}: {error}", 200)
 
@@ -390,7 +350,6 @@ class _Drain(_Receiver):
             try:
                 key = self._concrete_key(sample)
                 if key is not None:
-                    self.received += 1
                     self._inbox.offer((self._channel, _name(key), self._content(sample)))
             except Exception as error:  # noqa: BLE001
                 self._count_error(error)
@@ -444,7 +403,6 @@ class _Source(_Receiver):
             known = self._learn(key)
             if known is None:
                 return
-        self.received += 1
         items.append((*known, sample.payload.to_bytes()))
 
     def _learn(self, key: str) -> tuple[str, str] | None:

@@ -12,6 +12,7 @@ import msgspec
 import pytest
 from msgspec import inspect
 
+from foosim.client.core import ClientCore
 from foosim.common import limits
 from foosim.common.units import Pace
 from foosim.protocol import channels
@@ -148,8 +149,13 @@ class Disturbed:
     def counts(self, *fields: str) -> dict[str, int]:
         """The sum of these counts of every process, as far as it has them."""
         cores: dict[str, Any] = {name: process.core for name, process in self.system.processes.items()}
-        numbers = {name: core.statistics() for name, core in {**cores, VHUB: self.system.hub}.items()}
+        numbers = {name: self.counted(core) for name, core in {**cores, VHUB: self.system.hub}.items()}
         return {name: sum(getattr(number, field, 0) for field in fields) for name, number in numbers.items()}
+
+    @staticmethod
+    def counted(core: Any) -> Any:
+        """What has the counts of a core as attributes."""
+        return core.statistics() if isinstance(core, ClientCore) else core
 
     def malformed(self) -> dict[str, int]:
         """How many messages each process refused; the vHub and clients call it so, the others `refused`."""

@@ -285,8 +285,8 @@ def test_each_lie_is_counted_or_answered_by_who_hears_it(disturbed: Disturbed) -
     uncounted: list[Lie] = []
 
     def account(core: Any) -> int:
-        numbers = core.statistics()
-        return sum(getattr(numbers, field, 0) for field in (*REFUSED, "repeated", "held"))
+        held = len(getattr(core, "_pending", ())) + getattr(getattr(core, "state", None), "repeated", 0)
+        return held + sum(getattr(disturbed.counted(core), field, 0) for field in (*REFUSED, "repeated"))
 
     def tell() -> None:
         for lie in lies(disturbed.system):

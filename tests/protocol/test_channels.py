@@ -53,7 +53,6 @@ def test_planes_share_no_key_and_keys_are_valid() -> None:
         assert "{" not in channel.key.removesuffix("/{name}")
         assert all(chunk and chunk.strip() == chunk and "*" not in chunk and "$" not in chunk for chunk in chunks)
         assert channel.key_for("red") == channel.key.replace("{name}", "red")
-        assert channel.express, "small messages of a tick wait for nothing"
         assert channel.blocking is (channel.name not in {"view", "file_piece"}), "what is not requested again blocks"
 
 

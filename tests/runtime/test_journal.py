@@ -64,8 +64,6 @@ def test_a_record_is_in_the_file_when_append_returns(tmp_path: Path) -> None:
         for count, record in enumerate(RECORDS, 1):
             journal.append(record)
             assert list(read_records(journal.path)) == RECORDS[:count]
-        assert journal.statistics().records == len(RECORDS)
-        assert journal.statistics().bytes == journal.path.stat().st_size
 
 
 def test_a_killed_process_loses_nothing(tmp_path: Path) -> None:
@@ -138,7 +136,7 @@ def test_a_full_file_is_followed_by_one_that_starts_with_the_head(tmp_path: Path
         for tick in range(100):
             journal.append(b"tick %02d" % tick)
             journal.rotate_if_full(partial(bytes.__mod__, b"head after %02d", tick), tick)
-        assert journal.statistics().files == len(journal_files(tmp_path, "hub")) == 25
+        assert len(journal_files(tmp_path, "hub")) == 25
     starts = [next(read_records(path)) for path in journal_files(tmp_path, "hub")]
     assert starts[0] == b"tick 00"
     assert starts[1:] == sorted(starts[1:]) and all(start.startswith(b"head after") for start in starts[1:])
@@ -172,7 +170,7 @@ def test_files_go_once_nobody_needs_them(tmp_path: Path) -> None:
 def test_the_disk_is_told_each_interval_and_at_the_end(tmp_path: Path) -> None:
     journal = Journal(tmp_path, "hub", sync_every_s=0.001)
     journal.append(b"one")
-    while journal.statistics().syncs == 0:
+    while not journal._synced[1]:
         pass
     journal.close()
     assert list(read_journal(tmp_path, "hub")) == [b"one"]
@@ -255,9 +253,10 @@ def test_what_was_synced_before_a_later_record_is_damage_on_any_machine(
     with Journal(tmp_path, "hub", sync_every_s=0.001) as journal:
         for number in range(20):
             journal.append(b"%04d" % number)
-        before = journal.statistics().syncs
-        while journal.statistics().syncs < before + 2:
+        synced = {journal._synced}
+        while len(synced) < 3:
             journal.append(b"more")
+            synced.add(journal._synced)
         journal.append(b"last")
     started_again(monkeypatch)
     content, starts = journal.path.read_bytes(), places(journal.path)

@@ -191,7 +191,7 @@ class Far:
     def subscribe(self, key: str, channel: str, inbox: Inbox) -> None:
         self.did.append(("subscribe", key))
 
-    def publisher(self, key: str, express: bool, blocking: bool) -> Far:
+    def publisher(self, key: str, blocking: bool) -> Far:
         return self
 
     def put(self, payload: bytes) -> None:

@@ -11,7 +11,7 @@ import pytest
 from foosim.common import limits
 from foosim.common.units import Pace
 from foosim.deployment.loader import apply_sets, load_deployment
-from foosim.node.core import NodeCore, NodeStatistics
+from foosim.node.core import NodeCore
 from foosim.protocol import channels
 from foosim.protocol.codec import encode
 from foosim.protocol.messages import Build, ComponentVersion, Heartbeat, Hello, Ready, Refusal
@@ -162,7 +162,7 @@ def test_a_refusal_for_another_start_of_the_name_is_not_taken() -> None:
     process = node("red")
     process.receive(channels.REFUSAL, "red", encode(Refusal("red", "another boot", "no")), 0)
     process.receive(channels.REFUSAL, "red", b"\xc1", 0)
-    assert process.statistics().refused == 1
+    assert process.refused == 1
     assert process.member.refusal == ""
 
 
@@ -187,8 +187,7 @@ def test_a_build_that_cannot_be_is_refused_and_the_right_one_still_counts() -> N
         assert built is None, built
         process.receive(channels.BUILD, name, encode(right), 0)
         assert process.deployment is not None and not process.member.problem
-        account = process.statistics()
-        refused = account.refused if isinstance(account, NodeStatistics) else account.malformed
+        refused = process.refused if isinstance(process, NodeCore) else process.malformed
         assert refused == len(wrong)
 
 

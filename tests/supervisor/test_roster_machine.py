@@ -189,7 +189,7 @@ class Membership(RuleBasedStateMachine):
             channels.PART, node, Part(max(0, self.core.state.epoch - behind), 1, node, bytes(32), [], b"", b"", [])
         )
         assert self.core.state.missing_nodes == before
-        self.refused = self.core.statistics().refused
+        self.refused = self.core.refused
 
     # --- what always holds -------------------------------------------------------------------------------------------
 
@@ -215,7 +215,7 @@ class Membership(RuleBasedStateMachine):
             assert (process is None) == (self.state[node] == ABSENT)
             if process is not None:
                 assert process.lost == (self.state[node] == LOST) and process.boot == f"b{self.boots[node]}"
-        assert self.core.statistics().refused == self.refused and SUPERVISOR not in self.core.state.roster.by_name
+        assert self.core.refused == self.refused and SUPERVISOR not in self.core.state.roster.by_name
 
 
 TestMembership = Membership.TestCase

@@ -145,7 +145,7 @@ def test_who_only_looks_may_ask_for_what_changes_nothing_and_no_more() -> None:
     assert verbs["pause"].text == "'pause' is for operators: a viewer may request status, describe, watch"
     core.actions.clear()
     core.receive(channels.INQUIRY, "desk.1", encode(Request("desk.1", "id", "down", b"{}")), 0)
-    assert core.statistics().refused == 1 and core.state.end is None, "a request on the key of an inquiry is none"
+    assert core.refused == 1 and core.state.end is None, "a request on the key of an inquiry is none"
 
 
 def test_so_many_may_look_and_no_more() -> None:

@@ -43,6 +43,7 @@ from foosim.protocol.messages import (
 )
 from foosim.vhub.core import HubCore
 from foosim.vhub.recording.recorder import Recorder
+from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import Closing, HubRecord, TickRecord
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.edits import Add, Edit, Push, Remove, write
@@ -110,6 +111,12 @@ class HubRun:
     downs: list[tuple[str, Go | Down]] = field(default_factory=list)
     head: bytes = b""
     """The head that a new journal file would have at the end."""
+
+    @property
+    def state(self) -> HubState:
+        """The state of the hub that began."""
+        assert self.core.state is not None
+        return self.core.state
 
 
 class Driver:

@@ -110,7 +110,7 @@ def test_packets_come_back_as_columns(capture: CaptureData, hub_run: HubRun) -> 
     assert in_time != [closing.fates for closing in hub_run.closings]
     flights = [flight for fates in in_time for flight in fates]
     packets = capture.packets
-    account = hub_run.core.statistics()
+    account = hub_run.state.packets
     assert len(packets) == len(flights) == account.offered
     for name in ("source", "destination", "channel", "rule", "sequence", "copy", "sent_ns", "stamp_ns", "payload"):
         assert getattr(packets, name).tolist() == [getattr(flight, name) for flight in flights], name
@@ -174,7 +174,7 @@ def test_recoveries_come_back_as_the_commits_told_them(capture: CaptureData) -> 
 
 def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
     info = capture_info(path)
-    account = hub_run.core.statistics()
+    account = hub_run.state.packets
     chain = CHAIN_START
     for closing in hub_run.closings[1:]:
         chain = chain_next(chain, closing.digest)

@@ -49,7 +49,7 @@ def test_an_unfinished_file_gives_what_is_whole(chunked: bytes, hub_run: HubRun,
         assert 0 <= capture.about.unfinished_bytes <= size
         for tick, closing in zip(capture.captured_ticks(), hub_run.closings, strict=False):
             assert (tick.digest, tick.delivered) == (closing.digest, list(closing.delivered))
-        assert len(capture.packets) <= hub_run.core.statistics().offered
+        assert len(capture.packets) <= hub_run.state.packets.offered
         ends.add(len(ticks))
     assert len(ends) > 8 and 65 in ends and 0 in ends
     path.write_bytes(chunked)
@@ -69,7 +69,7 @@ def test_a_killed_writer_leaves_what_was_flushed(hub_run: HubRun, tmp_path: Path
     (tmp_path / "then.mcap").write_bytes(content)
     capture = open_capture(tmp_path / "then.mcap")
     assert capture.ticks.tolist() == list(range(65)) and not capture.finished
-    assert len(capture.packets) == hub_run.core.statistics().offered
+    assert len(capture.packets) == hub_run.state.packets.offered
     assert capture.about.end == {} and capture.frames.ticks.tolist() == [*range(0, 61, 10)]
 
 
@@ -223,7 +223,7 @@ def test_a_lagging_writer_slows_the_run_says_so_once_and_loses_nothing(
     assert [level for level, _ in said] == ["warning"]
     assert said[0][1].startswith(f"the run waits for its capture {path}: ")
     capture = open_capture(path)
-    assert len(capture.ticks) == 65 and len(capture.packets) == hub_run.core.statistics().offered
+    assert len(capture.ticks) == 65 and len(capture.packets) == hub_run.state.packets.offered
 
 
 def test_the_disk_is_asked_for_its_progress_while_a_sync_lasts(

@@ -131,4 +131,4 @@ def test_a_join_whose_times_do_not_fit_is_refused(join: Join, what: str) -> None
     hub.say(channels.CLIENT_HELLO, join.name, ClientHello(join.name, "one", limits.PROTOCOL_VERSION, "", 0))
     hub.say(channels.UP, join.name, join)
     assert what in hub.lines()[-1]
-    assert hub.core.statistics().malformed == 1 and not hub.core.sessions.joins
+    assert hub.core.malformed == 1 and not hub.core.sessions.joins

@@ -84,7 +84,7 @@ def test_a_flood_is_refused_and_dropped_and_counted_and_fits_into_every_message(
     for _, down in run.downs:
         decode(type(down), encode(down), limits.RADIO_MESSAGE_BYTES_MAX)
     fates = Counter(flight.cause for closing in run.closings for flight in closing.fates)
-    account = driver.core.statistics()
+    account = state.packets
     assert fates["rx_full"] > 0 and fates["rx_full"] == account.dropped
     assert account.offered == fates.total() and account.in_flight == fates["in_flight"]
     behind_a_gap = driver.said.total() - account.offered - account.refused

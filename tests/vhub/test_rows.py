@@ -75,7 +75,7 @@ def rows(entries: list[Entry], kind: type[Any]) -> list[Any]:
 
 
 def test_each_thing_that_happened_has_one_row(hub_run: HubRun, entries: list[Entry]) -> None:
-    account = hub_run.core.statistics()
+    account = hub_run.state.packets
     assert [row.tick for row in rows(entries, TickRow)] == list(range(65))
     assert [row.tick for row in rows(entries, LayoutRow)] == [0]
     assert [row.tick for row in rows(entries, FrameRow)] == [0, 10, 20, 30, 40, 50, 60]
@@ -97,8 +97,8 @@ def test_each_thing_that_happened_has_one_row(hub_run: HubRun, entries: list[Ent
 
 def test_a_run_that_ends_within_a_tick_has_the_fates_of_the_half_that_was_closed(half_closed_run: HubRun) -> None:
     """Packets that robots sent at tick 15 are judged, and some have arrived, before the players are asked."""
-    account = half_closed_run.core.statistics()
-    assert account.closed == 14 and half_closed_run.closings[-1].frame.tick == 15
+    account = half_closed_run.state.packets
+    assert half_closed_run.state.closed == 14 and half_closed_run.closings[-1].frame.tick == 15
     fates = Counter(flight.cause for closing in half_closed_run.closings for flight in closing.fates)
     assert (fates.total(), fates[""], fates["in_flight"]) == (account.offered, account.delivered, account.in_flight)
     assert any(not flight.cause for flight in half_closed_run.closings[-1].fates)

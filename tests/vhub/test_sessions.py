@@ -191,7 +191,7 @@ def test_only_declared_lockstep_clients_are_waited_for() -> None:
 def test_no_other_client_can_make_the_run_wait_for_it(period: int) -> None:
     hub = Hub().begin()
     hub.enter("ear", period)
-    assert hub.core.statistics().malformed == 1
+    assert hub.core.malformed == 1
     assert "ear joins in lockstep, but is not declared lockstep" in hub.lines()[-1]
     for tick in range(12):
         hub.close(tick)
@@ -217,7 +217,7 @@ def test_what_is_no_answer_to_this_go_is_not_taken(wrong: Done | Up) -> None:
     hub.commit(0)
     hub.said()
     hub.say(channels.UP, wrong.name, wrong)
-    assert hub.core.waiting_for == "Done of hand, knee" and hub.core.statistics().repeated == 1
+    assert hub.core.waiting_for == "Done of hand, knee" and hub.core.repeated == 1
     hub.done("knee", 0)
     hub.done("hand", 0)
     (deliveries,) = hub.said(channels.DELIVERIES)
@@ -383,7 +383,7 @@ def test_a_commit_whose_frame_is_another_is_refused_and_the_right_one_counts() -
     values = bytearray(FRAME.values.tobytes())
     values[40] ^= 1
     hub.say(channels.COMMIT, "vhub", Commit(1, 0, FRAME.digest, bytes(values), [], [], False))
-    assert hub.core.statistics().malformed == 1 and hub.core.waiting_for == "commit"
+    assert hub.core.malformed == 1 and hub.core.waiting_for == "commit"
     hub.close(0)
     assert hub.state.closed == 0
 
@@ -477,7 +477,7 @@ def test_what_comes_late_of_a_process_that_is_gone_is_of_nobody() -> None:
 def test_a_client_that_is_no_player_does_not_end_the_run_by_saying_so() -> None:
     hub = Hub().begin()
     hub.say(channels.UP, "hand", Failure("hand", "one", "hand failed at tick 0: it says so"))
-    assert not hub.core.lost and hub.core.statistics().malformed == 1
+    assert not hub.core.lost and hub.core.malformed == 1
 
 
 # --- hellos of which it is not known who lives -----------------------------------------------------------------------

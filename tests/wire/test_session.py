@@ -94,13 +94,11 @@ def test_roles_beside_the_router_wait_in_one_queue_for_all_that_others_publish(p
     hub.read(channels.VHUB_READS)
     assert not [thread.name for thread in threading.enumerate() if thread.name.startswith("receive")]
     node = plane.client()
-    part, samples = (
-        node.publisher(channel.key_for("red"), True, True) for channel in (channels.PART, channels.SAMPLES)
-    )
+    part, samples = (node.publisher(channel.key_for("red")) for channel in (channels.PART, channels.SAMPLES))
     put_until_heard(part, inbox)
     samples.put(b"samples")
     part.put(b"part")
-    node.publisher("foosim/simulation/nothing/red", True, True).put(b"unknown")
+    node.publisher("foosim/simulation/nothing/red").put(b"unknown")
     hub.put(channels.DELIVERIES, "vhub", b"deliveries")
     samples.put(b"more")
     assert take_all(inbox, 3) == [
@@ -108,7 +106,7 @@ def test_roles_beside_the_router_wait_in_one_queue_for_all_that_others_publish(p
         (channels.PART.key, "red", b"part"),
         (channels.SAMPLES.key, "red", b"more"),
     ]
-    assert plane.router.statistics().refused == 1
+    assert sum(receiver.refused for receiver in plane.router.receivers) == 1
     assert bus.pop()[2:4] == ("supervisor", channels.DELIVERIES)
 
 
@@ -119,7 +117,7 @@ def test_a_message_comes_with_its_channel_and_the_name_in_its_key(plane: Plane, 
     for number in range(500):
         publisher.put(bytes([number % 256]) * 1200)
     assert take_all(inbox, 500) == [("part", "blue", bytes([number % 256]) * 1200) for number in range(500)]
-    assert inbox.statistics().dropped == 0
+    assert inbox.dropped == 0
 
 
 def test_a_session_does_not_hear_itself(plane: Plane, inbox: Inbox) -> None:
@@ -194,7 +192,7 @@ def test_a_key_with_wildcards_is_refused_and_counted(plane: Plane, inbox: Inbox)
     named.put(b"end")
     assert inbox.take(LONG_S) == [("part", "blue", b"end")]
     assert other.take(LONG_S) == [("order", "blue", b"end")]
-    assert reader.statistics().refused == 4
+    assert sum(receiver.refused for receiver in reader.receivers) == 4
 
 
 def test_an_unknown_key_and_an_error_of_ours_are_counted_and_end_nothing(plane: Plane, inbox: Inbox) -> None:
@@ -207,9 +205,9 @@ def test_an_unknown_key_and_an_error_of_ours_are_counted_and_end_nothing(plane: 
         sender.publisher(key).put(b"")
     good.put(b"end")
     assert inbox.take(LONG_S) == [("order", "all", b"end")]
-    statistics = reader.statistics()
-    assert (statistics.refused, statistics.errors) == (1, 3)
-    assert "a key that the table does not have" in statistics.error
+    (receiver,) = reader.receivers
+    assert (receiver.refused, receiver.errors) == (1, 3)
+    assert "a key that the table does not have" in receiver.error
 
 
 class Fragile(Inbox):
@@ -229,9 +227,9 @@ def test_an_error_in_a_receiving_thread_is_counted_and_silences_nothing(plane: P
     for payload in (b"fault", b"fault", b"end"):
         publisher.put(payload)
     assert inbox.take(LONG_S) == [("w", "a", b"end")]
-    statistics = reader.statistics()
-    assert (statistics.errors, statistics.refused) == (2, 0)
-    assert "a fault of ours" in statistics.error
+    (receiver,) = reader.receivers
+    assert (receiver.errors, receiver.refused) == (2, 0)
+    assert "a fault of ours" in receiver.error
 
 
 def test_a_reader_that_does_not_read_loses_the_newest_and_nobody_waits_for_it(plane: Plane) -> None:
@@ -243,7 +241,7 @@ def test_a_reader_that_does_not_read_loses_the_newest_and_nobody_waits_for_it(pl
     for number in range(200):
         publisher.put(bytes([number]))
     assert take_all(quick, 200) == [("w", "a", bytes([number])) for number in range(200)]
-    while slow.statistics().dropped < 190:
+    while slow.dropped < 190:
         assert not quick.take(0.01)
     assert [payload for _, _, payload in slow.take(0)] == [bytes([number]) for number in range(10)]
 
@@ -265,7 +263,7 @@ def test_presence_is_told_to_those_who_come_later_and_ends_with_the_session(plan
 
 BE_PRESENT = """
 import sys
-from foosim.runtime.transport.session import Session
+from foosim.runtime.transport.session import Publisher, Session
 session = Session.client(sys.argv[1], 900.0)
 session.declare_alive("w/alive/blue")
 session.publisher("w/part/blue").put(b"")
@@ -316,7 +314,7 @@ def test_garbage_on_the_port_harms_nobody(plane: Plane, inbox: Inbox) -> None:
 
 RUN_A_ROUTER = """
 import sys
-from foosim.runtime.transport.session import Session
+from foosim.runtime.transport.session import Publisher, Session
 session = Session.router(sys.argv[1])
 print("listening", flush=True)
 sys.stdin.read()
