@@ -1,8 +1,8 @@
 """Elementary functions of + - * / and square roots alone: the same bits on every machine, for one number as for many.
 
 The last bits of `math` and numpy depend on the machine, on the version and on the length of an array. What enters a
-frame takes these functions instead; their bits never change. `foosim.common.batched.exact_arrays` has each of them for
-arrays: the same operations in the same order, with the constants of this module, hence the same bits.
+frame takes these functions instead; their bits never change. `foosim.common.batched.exact_arrays` has `exp`, `log` and
+`sincos` for arrays: the same operations in the same order, with the constants of this module, hence the same bits.
 
 Angles are in rad. No argument raises: an overflow is `inf`, and an undefined value is `nan`, always the same one,
 since processors make NaNs of different signs. Zeros keep their signs as in Annex F of C99. Square roots come from
@@ -13,13 +13,12 @@ Largest errors, in units of the last place (tests/common/test_exact_math.py):
 | function | error |
 |---|---|
 | `exp`, `log`, `sin`, `cos`, `sincos`, `atan` | 1 |
-| `hypot`, `tanh`, `atan2` | 1.5 |
+| `hypot`, `atan2` | 1.5 |
 | `tan`, `asin`, `acos` | 2.5 |
 
 Sources. Polynomials and their arrangement for `exp`, `log`, `sin`, `cos`, `atan`: fdlibm 5.3 (Sun Microsystems, 1993).
-`tanh` below 5/8: Cephes 2.8 (Moshier, 2000). Reduction of angles: Cody and Waite, Software Manual for the Elementary
-Functions (1980), and for large ones Payne and Hanek, ACM SIGNUM 18 (1983). Exact differences: Knuth, The Art of
-Computer Programming 2, 4.2.2.
+Reduction of angles: Cody and Waite, Software Manual for the Elementary Functions (1980), and for large ones Payne and
+Hanek, ACM SIGNUM 18 (1983). Exact differences: Knuth, The Art of Computer Programming 2, 4.2.2.
 """
 
 from __future__ import annotations
@@ -105,16 +104,6 @@ ATAN8: Final = -0.058335701337905735
 ATAN9: Final = 0.049768779946159324
 ATAN10: Final = -0.036531572744216916
 ATAN11: Final = 0.016285820115365782
-
-TANH_NEAR: Final = 0.625
-TANH_FAR: Final = 22.0
-"""Up to the first a rational function; from the second on the hyperbolic tangent is 1."""
-TANH1: Final = -1614.6876844170845
-TANH2: Final = -99.28772310019185
-TANH3: Final = -0.9643991794250523
-TANH4: Final = 4844.063053251255
-TANH5: Final = 2235.4883906010045
-TANH6: Final = 112.81167849163293
 
 LARGE: Final = 3.3519519824856493e153
 SMALL: Final = 3.2033329522929615e-145
@@ -302,18 +291,6 @@ def asin(x: float) -> float:
 def acos(x: float) -> float:
     """Return the arccosine of x, between 0 and pi; nan where x is beyond -1 and 1."""
     return atan2(sqrt((1.0 - x) * (1.0 + x)), x) if -1.0 <= x <= 1.0 else nan
-
-
-def tanh(x: float) -> float:
-    """Return the hyperbolic tangent of x."""
-    size = abs(x)
-    if size < TANH_NEAR:
-        z = size * size
-        ratio = (TANH1 + z * (TANH2 + z * TANH3)) / (TANH4 + z * (TANH5 + z * (TANH6 + z)))
-        return copysign(size + size * (z * ratio), x)
-    if size < TANH_FAR:
-        return copysign(1.0 - 2.0 / (exp(2.0 * size) + 1.0), x)
-    return nan if isnan(x) else copysign(1.0, x)
 
 
 def hypot(x: float, y: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foosim.common.batched import exact_arrays
-from foosim.common.exact_math import PI
+from foosim.common.exact_math import PI, cos
 from foosim.world.matter.mesh import Mesh
 from foosim.world.scene import Box, Capsule, Cylinder, Geometry, Hull
 
@@ -71,7 +71,7 @@ def _circle(sides: int) -> Corners:
 
 def _inner(sides: int) -> float:
     """Return how far the middle of a side is from the centre, of a corner's distance."""
-    return float(exact_arrays.cos(np.array([PI / sides]))[0])
+    return cos(PI / sides)
 
 
 def _pairs(line: Floats) -> Floats:
