@@ -19,7 +19,6 @@ from foosim.deployment.text.files import read_source_file
 from foosim.launcher import pki
 from foosim.launcher.hosts import Remote, send_files
 from foosim.launcher.pki import LEAF_DAYS, LEAF_DAYS_MAX, RENEW_DAYS, Shown
-from foosim.protocol import identity
 from foosim.protocol.identity import identities_of
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 
@@ -103,7 +102,7 @@ def client(
     for one in name:
         if not is_name(one):
             raise BadValue("not a name for a client", one)
-    for path in pki.issue(folder, [identity.client(one) for one in name], days=days):
+    for path in pki.issue(folder, [f"client.{one}" for one in name], days=days):
         print(path)
 
 

@@ -78,7 +78,6 @@ def run_roles(  # noqa: PLR0913  # what the command was given
     process, `radio` that of the vHub's radio plane, which only players need. What only some roles need is imported
     with them.
     """
-    from foosim.protocol import identity
     from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
     from foosim.runtime.journal import remove_journal
     from foosim.runtime.process import Stop, die_with_parent, has_launcher
@@ -98,17 +97,17 @@ def run_roles(  # noqa: PLR0913  # what the command was given
             credentials = None
             for player in players:
                 if session is None or credentials is not None:  # a session has one certificate
-                    link = client_session(radio, identity.client(player), pki, stop, Plane.RADIO)
+                    link = client_session(radio, f"client.{player}", pki, stop, Plane.RADIO)
                     session, credentials = opened.enter_context(link)
                 process.add(PlayerShell(process, player, session, credentials=credentials))
 
         shell, simulation, credentials = None, None, None
-        here = ([VHUB] if vhub is not None else []) + [identity.node(node) for node in nodes]
+        here = ([VHUB] if vhub is not None else []) + [f"node.{node}" for node in nodes]
         if supervisor is not None:
             shell = opened.enter_context(_supervisor(process, *supervisor, pki, is_launched or count > 1))
             simulation = shell.session
         elif here:
-            own_name = identity.process(name) if len(here) > 1 else here[0]
+            own_name = f"process.{name}" if len(here) > 1 else here[0]
             simulation, credentials = opened.enter_context(client_session(connect, own_name, pki, stop))
         if vhub is not None:
             assert simulation is not None

@@ -20,7 +20,7 @@ from foosim.client.loading import load_player, look_in
 from foosim.client.playing import PlayerLoop, report_failure
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
-from foosim.protocol import channels, identity
+from foosim.protocol import channels
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import VHUB, Plane
 from foosim.runtime.command import DONE, FAILED, REFUSED, PathOption, PkiOption, new_app
@@ -113,7 +113,7 @@ def run_players(
         links: list[tuple[Session, Credentials | None]] = []
         for name in names:
             if pki is not None or not links:  # a session has one certificate
-                who = identity.client(name)
+                who = f"client.{name}"
                 link = client_session(connect, who, pki, stop, Plane.RADIO, sets_runtime=not links)
                 links.append(stack.enter_context(link))
             session, credentials = links[-1]

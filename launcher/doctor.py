@@ -209,7 +209,7 @@ def _certificates(case: Case) -> Iterator[_Row]:
     if (folder / CA_KEY_FILE).exists():
         remedy = "remove it there" if case.is_there else "keep it where certificates are issued"
         yield CA_KEY_FILE, "problem" if case.is_there else "warning", "is beside the certificates", remedy
-    declared = [identity.process(name) for name in joint_processes(case.deployment, ("deployed",))]
+    declared = [f"process.{name}" for name in joint_processes(case.deployment, ("deployed",))]
     for who in identities_on(case.deployment, case.host):
         if who in declared or identity.parse_identity(who)[0] != "process":
             yield _certificate(folder, who, case)

@@ -193,10 +193,9 @@ def fingerprint(certificate: x509.Certificate) -> str:
 def identities_on(deployment: Deployment, host: str | None) -> list[str]:
     """Return a run's identities on a host, in the order of `identities_of`; None: those on no host."""
     where = places(deployment)
-    known = {VHUB: where.get(VHUB)}
-    known |= {names_of.node(name): where.get(name) for name in deployment.nodes}
-    known |= {names_of.client(name): where.get(name) for name in deployment.players}
-    known |= {names_of.process(name): where.get(its.roles[0]) for name, its in joint_processes(deployment).items()}
+    roles = (VHUB, *deployment.nodes, *deployment.players)
+    known = {names_of.of_role(role, deployment): where.get(role) for role in roles}
+    known |= {f"process.{name}": where.get(its.roles[0]) for name, its in joint_processes(deployment).items()}
     return [who for who in names_of.identities_of(deployment) if known.get(who) == host]
 
 

@@ -15,7 +15,7 @@ from foosim.common.errors import BadValue
 from foosim.common.names import is_name
 from foosim.node.core import NodeCore
 from foosim.node.engines_pool import Solver
-from foosim.protocol import channels, identity
+from foosim.protocol import channels
 from foosim.protocol.actions import Log
 from foosim.protocol.channels import SUPERVISOR, Plane
 from foosim.protocol.fingerprint import library_fingerprint
@@ -119,7 +119,7 @@ def run_node(name: str, connect: str, world: str = "", pki: Path | None = None, 
     if not is_name(name):
         raise BadValue("not a name for a node", name)
     stop = Stop()
-    with client_session(connect, identity.node(name), pki, stop, sets_runtime=True) as (session, credentials):
+    with client_session(connect, f"node.{name}", pki, stop, sets_runtime=True) as (session, credentials):
         process = Process(name, progress)
         process.add(NodeShell(process, name, session, world, credentials))
         stop.then(process.stop)

@@ -106,7 +106,7 @@ def _union(process: str, grants: Sequence[Grant]) -> Grant:
         return tuple(sorted({key for its in grants for key in keys(its)}))
 
     return Grant(
-        identity=identity.process(process),
+        identity=f"process.{process}",
         name=process,
         writes=each(lambda its: its.writes),
         reads=each(lambda its: its.reads),

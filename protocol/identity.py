@@ -19,26 +19,11 @@ ROLES: Final = ("node", "client", "process", "operator", "viewer")
 FORMS: Final = "supervisor, vhub, node.NAME, client.NAME, process.NAME, operator.NAME or viewer.NAME"
 
 
-def node(name: str) -> str:
-    """Return the identity of a node."""
-    return f"node.{name}"
-
-
-def client(name: str) -> str:
-    """Return the identity of a client, or of a player."""
-    return f"client.{name}"
-
-
-def process(name: str) -> str:
-    """Return the identity of a process with several roles."""
-    return f"process.{name}"
-
-
 def of_role(role: str, deployment: Deployment) -> str:
     """Return the identity of a role: of the supervisor, the vHub, a node or a player."""
     if role in (SUPERVISOR, VHUB):
         return role
-    return node(role) if role in deployment.nodes else client(role)
+    return f"node.{role}" if role in deployment.nodes else f"client.{role}"
 
 
 def of_process(its: Process, deployment: Deployment) -> list[str]:
@@ -47,19 +32,9 @@ def of_process(its: Process, deployment: Deployment) -> list[str]:
     Beside the supervisor nodes need none, beside the vHub players.
     """
     routers: list[str] = [role for role in (SUPERVISOR, VHUB) if role in its.roles]
-    nodes = [node(role) for role in its.roles if role in deployment.nodes and SUPERVISOR not in its.roles]
-    players = [client(role) for role in its.roles if role in deployment.players and VHUB not in its.roles]
-    return [*routers, *([process(its.name)] if is_joint(its, deployment) else nodes), *players]
-
-
-def operator(name: str) -> str:
-    """Return the identity of an operator."""
-    return f"operator.{name}"
-
-
-def viewer(name: str) -> str:
-    """Return the identity of a viewer."""
-    return f"viewer.{name}"
+    nodes = [f"node.{role}" for role in its.roles if role in deployment.nodes and SUPERVISOR not in its.roles]
+    players = [f"client.{role}" for role in its.roles if role in deployment.players and VHUB not in its.roles]
+    return [*routers, *([f"process.{its.name}"] if is_joint(its, deployment) else nodes), *players]
 
 
 def parse_identity(text: str) -> tuple[str, str]:
@@ -74,12 +49,11 @@ def parse_identity(text: str) -> tuple[str, str]:
 
 def identities_of(deployment: Deployment) -> list[str]:
     """Return all identities of a run: servers first, others by role and name."""
-    return [
-        SUPERVISOR,
-        VHUB,
-        *map(node, sorted(deployment.nodes)),
-        *map(client, sorted([*deployment.players, *deployment.clients])),
-        *map(process, joint_processes(deployment)),
-        *map(operator, sorted(deployment.access.operators)),
-        *map(viewer, sorted(deployment.access.viewers)),
-    ]
+    names = (
+        ("node", deployment.nodes),
+        ("client", [*deployment.players, *deployment.clients]),
+        ("process", joint_processes(deployment)),
+        ("operator", deployment.access.operators),
+        ("viewer", deployment.access.viewers),
+    )
+    return [SUPERVISOR, VHUB, *(f"{role}.{name}" for role, each in names for name in sorted(each))]

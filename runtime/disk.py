@@ -11,6 +11,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Final
 
+LOOK_NS: Final = 1_000_000_000
+"""The period of reading the free space of a journal's disk."""
 _UNITS: Final = {"TiB": 1 << 40, "TB": 10**12, "GiB": 1 << 30, "GB": 10**9, "MiB": 1 << 20, "MB": 10**6, "KiB": 1 << 10}
 
 
@@ -54,6 +56,34 @@ def free_bytes(place: int | Path) -> int:
 def room_on_disk(place: int | Path, reserve: int) -> Room:
     """Return the room on a disk; raises OSError."""
     return Room(free_bytes(place), reserve, "on its disk")
+
+
+class JournalRoom:
+    """Watches the free space for a journal: a run ends in order while its end can still be written."""
+
+    def __init__(self, folder: Path, reserve: int) -> None:
+        """At `reserve` bytes of free space the run has to end."""
+        self._folder = folder
+        self._reserve = reserve
+        self._level = Level.FINE
+        self._look_ns = 0
+
+    def look(self, now_ns: int) -> tuple[str, str]:
+        """Once a second: return what to warn of when space gets low, and why the run has to end once it does; else ""
+        and ""."""
+        if now_ns < self._look_ns or self._level >= Level.FULL:
+            return "", ""
+        self._look_ns = now_ns + LOOK_NS
+        try:
+            room = room_on_disk(self._folder, self._reserve)
+        except OSError:
+            return "", ""  # writing the next record reports it
+        before, self._level = self._level, max(self._level, room.level)
+        if self._level is before:
+            return "", ""
+        text = f"{self._folder}: {room}"
+        is_low = self._level is Level.LOW
+        return (f"room gets little, at the reserve the run ends: {text}", "") if is_low else ("", text)
 
 
 def megabytes(count: int) -> str:

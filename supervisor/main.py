@@ -26,7 +26,7 @@ from foosim.protocol.access import access_to
 from foosim.protocol.channels import SUPERVISOR, VHUB, Plane
 from foosim.protocol.fingerprint import library_fingerprint
 from foosim.runtime.command import DONE, FAILED, REFUSED
-from foosim.runtime.disk import Level, room_on_disk
+from foosim.runtime.disk import JournalRoom
 from foosim.runtime.journal import Journal, JournalError, journal_files
 from foosim.runtime.process import clock_name, new_boot
 from foosim.runtime.roles.shell import Process, RoleShell
@@ -37,38 +37,6 @@ from foosim.runtime.transport.settings import Security
 from foosim.supervisor.core import SupervisorCore
 from foosim.supervisor.records import History, fold
 from foosim.supervisor.settings import RunSettings
-
-LOOK_NS: Final = 1_000_000_000
-"""The period of reading the free space of the journal's disk."""
-
-
-class JournalRoom:
-    """Watches the free space for the journal: a run ends in order while its end can still be written."""
-
-    def __init__(self, folder: Path, reserve: int, core: SupervisorCore) -> None:
-        """At `reserve` bytes of free space the run ends."""
-        self._folder = folder
-        self._reserve = reserve
-        self._core = core
-        self._level = Level.FINE
-        self._look_ns = 0
-
-    def look(self, now_ns: int) -> None:
-        """Once a second: log that space gets low, and at the reserve end the run."""
-        if now_ns < self._look_ns:
-            return
-        self._look_ns = now_ns + LOOK_NS
-        try:
-            room = room_on_disk(self._folder, self._reserve)
-        except OSError:
-            return  # writing the next record reports it
-        if room.level > self._level:
-            self._level = room.level
-            if room.level is Level.LOW:
-                text = f"room gets little, at the reserve the run ends: {self._folder}: {room}"
-                self._core.state.log("warning", text)
-            else:
-                self._core.fail(f"lost room for the journal: {self._folder}: {room}")
 
 
 class SupervisorShell:
@@ -110,7 +78,7 @@ class SupervisorShell:
         self.role.turn = self._turn
         self.role.on_unwritten = self._on_unwritten
         reserve = self.core.state.deployment.capture.reserve_bytes
-        self._room = JournalRoom(folder.journals, reserve, self.core)
+        self._room = JournalRoom(folder.journals, reserve)
         self.role.took = self.core.progress.took
         self.role.stood = self.core.on_standstill
         self.role.lacking = lambda: self.core.lacking
@@ -175,7 +143,11 @@ class SupervisorShell:
     def _turn_journal(self, now_ns: int) -> None:
         """Begin a new file when one is full; the one before it stays until the next turn, when this one is synced."""
         tick = self.core.state.frame.tick
-        self._room.look(now_ns)
+        warning, why = self._room.look(now_ns)
+        if warning:
+            self.core.state.log("warning", warning)
+        if why:
+            self.core.fail(f"lost room for the journal: {why}")
         try:
             if self._journal.rotate_if_full(self.core.state.checkpoint, tick):
                 self._journal.forget_before(self._turned_tick)

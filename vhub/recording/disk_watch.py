@@ -14,10 +14,8 @@ from typing import Any, Final
 
 from foosim.capture.writer import CaptureState, CaptureWriter
 from foosim.protocol.run_status import CLOSING, NOT_RECORDED
-from foosim.runtime.disk import Level, room_on_disk
+from foosim.runtime.disk import JournalRoom, Level
 
-LOOK_NS: Final = 1_000_000_000
-"""How often the journal's disk is checked."""
 _STATES: Final = {Level.FINE: "on", Level.LOW: "low", Level.FULL: "full", Level.OUT: "ended"}
 DEVICES: Final = Path("/sys/dev/block")
 WRITES, SECTORS_WRITTEN = 4, 6
@@ -54,11 +52,8 @@ class RoomWatch:
         self.ends: tuple[str, str] | None = None
         """What has failed, and why, when the run must end."""
         self._capture = capture
-        self._journals = journals
-        self._reserve = reserve
+        self._journal = JournalRoom(journals, reserve)
         self._level = Level.FINE
-        self._journal_level = Level.FINE
-        self._look_ns = 0
         self._disk = None if capture is None else DiskProgress(capture.path.parent)
 
     def look(self, now_ns: int) -> list[tuple[str, str]]:
@@ -66,10 +61,10 @@ class RoomWatch:
         entries = []
         while self._capture is not None and self._capture.states:
             entries += self._entries(self._capture.states.popleft(), self._capture.stops_world)
-        if now_ns >= self._look_ns:
-            self._look_ns = now_ns + LOOK_NS
-            entries += self._look_at_journal()
-        return entries
+        warning, why = self._journal.look(now_ns)
+        if why:
+            self.ends = ("room for the journal", why)
+        return [*entries, ("warning", warning)] if warning else entries
 
     def _entries(self, state: CaptureState, stops_world: bool) -> list[tuple[str, str]]:
         """Handle a new state of the capture."""
@@ -82,20 +77,6 @@ class RoomWatch:
                 self.ends = ("the capture", state.text)
             return [("error", f"not captured further: {state.text}")] if state.level is Level.OUT else []
         return [("error", f"the run continues without its capture: {state.text}")]
-
-    def _look_at_journal(self) -> list[tuple[str, str]]:
-        try:
-            room = room_on_disk(self._journals, self._reserve)
-        except OSError:
-            return []  # the next record shows it
-        level, before = room.level, self._journal_level
-        self._journal_level = max(level, before)
-        if level <= before or before >= Level.FULL:
-            return []
-        if level is Level.LOW:
-            return [("warning", f"room gets little, at the reserve the run ends: {self._journals}: {room}")]
-        self.ends = ("room for the journal", f"{self._journals}: {room}")
-        return []
 
     def disk_progress(self, now_ns: int) -> int:
         """Return a number that changes while a sync of the capture makes progress."""
