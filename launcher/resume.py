@@ -23,10 +23,10 @@ from foosim.protocol.codec import decode, decode_any
 from foosim.protocol.messages import Commit
 from foosim.runtime.journal import (
     JournalError,
+    Records,
     journal_files,
     read_journal,
     read_newest,
-    read_records,
     read_whole,
     remove_journal,
 )
@@ -83,7 +83,7 @@ def _check_hub(folder: RunFolder) -> None:
         if capture is not None and parts_at(capture):
             raise JournalError(f"the vHub's journal is gone from {folder.journals}")
         return  # it was never begun
-    raw = next(read_records(files[0]), None)
+    raw = next(Records(files[0]), None)
     if raw is None:
         return  # it was made, and nothing was written
     head = decode_any(HubRecord, raw)
@@ -181,7 +181,7 @@ def captured_at(folder: RunFolder) -> Path | None:
     """Return the path of a run's capture from its vHub's journal; None without a journal or a capture."""
     for file in journal_files(folder.journals, VHUB):
         try:
-            head = decode_any(HubRecord, next(read_records(file), b""))
+            head = decode_any(HubRecord, next(Records(file), b""))
         except (JournalError, Malformed):
             continue  # another file may have it
         if isinstance(head, HeadRecord) and head.capture:

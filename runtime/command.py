@@ -23,7 +23,6 @@ from foosim.common.names import nearest_name
 
 DONE: Final = 0
 FAILED: Final = 1
-BAD_INPUT: Final = 2
 REFUSED: Final = 3
 INTERRUPTED: Final = 130
 HELP_WIDTH_MAX: Final = 100

@@ -171,8 +171,8 @@ def _numbered(folder: Path, stem: str) -> list[tuple[int, Path]]:
 class Records(Iterator[bytes]):
     """The records of one file, in order, up to the end of the file or of the journal.
 
-    After the last one `left_bytes` is the number of bytes after the last valid record: 0 in a whole file. Raises
-    JournalDamaged at an invalid record that was valid once.
+    After the last one `left_bytes` is the number of bytes after the last valid record: 0 in a whole file. A torn tail,
+    as a killed machine leaves, is no error. Raises JournalDamaged at an invalid record that was valid once.
     """
 
     def __init__(self, path: Path) -> None:
@@ -240,11 +240,6 @@ class Records(Iterator[bytes]):
                 raise self.damaged(following)
 
 
-def read_records(path: Path) -> Records:
-    """Read one file of a journal. A torn tail, as a killed machine leaves, is no error: see `left_bytes`."""
-    return Records(path)
-
-
 def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
     """Yield the records of all files of a journal, in order; each file but the first starts with its head again.
 
@@ -254,7 +249,7 @@ def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
     torn: tuple[int, Records] | None = None
     """The first file of that opening without an end, and its number."""
     for serial, path in _numbered(folder, stem):
-        records = read_records(path)
+        records = Records(path)
         head = records.head
         if head is not None and head.opening != opening:
             opening, torn = head.opening, None
@@ -272,7 +267,7 @@ def read_journal(folder: Path, stem: str) -> Iterator[bytes]:
 def read_newest(folder: Path, stem: str) -> Iterator[bytes]:
     """Yield the records of a journal's newest file that has any: its checkpoint replaces the files before it."""
     for path in reversed(journal_files(folder, stem)):
-        records = read_records(path)
+        records = Records(path)
         first = next(records, None)
         if first is not None:
             yield first

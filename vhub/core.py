@@ -516,16 +516,17 @@ class HubCore:
     def _resume(self, past: Past, now_ns: int) -> None:
         """Resume as the vHub before: restore its state, and wait for the supervisor's grant."""
         assert self.deployment is not None and self.releases is not None
-        state = self.state = past.state
+        fold = past.fold
+        state = self.state = fold.state
         self.clients.begin(self.deployment, state, self.releases)
-        self.commits.start(past.layout, state.closed + 1, past.chain, past.committed)
+        self.commits.start(fold.layout, state.closed + 1, fold.chain, past.committed)
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)
-        self.clients.resume(past.inputs, past.absences, now_ns)
+        self.clients.resume(fold.inputs, fold.absences, now_ns)
         self.actions += past.actions()
         if past.epoch is not None:
             self._take_epoch(past.epoch)
-            self.handshake.begin(past.machine, past.published, past.owing)
+            self.handshake.begin(fold.machine, past.published, past.owing)
         self._retry.progress(self.deployment.tick_ns, now_ns)
 
     def _on_recall(self, recall: Recall, payload: bytes, now_ns: int) -> None:

@@ -122,6 +122,11 @@ class RadioKeys(LinkSettings):
         """Whether packets go by radio: where the ends are decides, and others on air."""
         return self.medium not in ("none", "wired")
 
+    @property
+    def sends_once(self) -> bool:
+        """Whether a broadcast is sent once for all its receivers; a base station sends to each by itself."""
+        return self.is_on_air and self.published == "broadcast" and self.medium != "lte"
+
 
 LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)
 """Bytes that LoRaWAN allows by spreading factor 7 to 12 in Europe; recalled, unverified."""

@@ -49,11 +49,6 @@ class Selector:
         else:
             self._pattern = _glob(text)
 
-    @property
-    def wildcards(self) -> int:
-        """How many texts it takes from a name."""
-        return self._pattern.groups
-
     def match(self, name: str) -> tuple[str, ...] | None:
         """Return the texts that the wildcards match, None for a name outside the selection."""
         found = self._pattern.fullmatch(name)

@@ -31,7 +31,7 @@ from foosim.protocol.codec import decode_any
 from foosim.protocol.messages import End
 from foosim.protocol.run_status import UNFINISHED
 from foosim.runtime.command import DONE, FAILED, REFUSED
-from foosim.runtime.journal import Journal, journal_files, read_records
+from foosim.runtime.journal import Journal, Records, journal_files
 from foosim.runtime.roles.shell import Process
 from foosim.runtime.run_folder import RunFolder, create_run
 from foosim.runtime.transport.session import Session
@@ -324,7 +324,7 @@ def test_a_signal_while_the_command_itself_is_imported_leaves_a_result(module: s
 
 def test_a_supervisor_that_is_started_after_the_end_does_not_wait_for_a_vhub_that_is_done(run: Run, left: Left) -> None:
     left.capture.write_bytes(run.capture.read_bytes())
-    with supervised(left, list(read_records(left.journal(SUPERVISOR)))) as (_, shell):
+    with supervised(left, list(Records(left.journal(SUPERVISOR)))) as (_, shell):
         assert shell.core.state.end is not None and shell.core.failover.waits_for_hub(time.monotonic_ns())
         assert shell.is_over()
         left.capture.write_bytes(run.cut.read_bytes())
@@ -335,7 +335,7 @@ def test_a_supervisor_that_is_started_after_the_end_does_not_wait_for_a_vhub_tha
 def test_of_a_run_that_is_not_gone_on_with_no_result_is_written(left: Left) -> None:
     """So it can be resumed again."""
     journal = left.journal(SUPERVISOR)
-    records = [raw for raw in read_records(journal) if not isinstance(decode_any(Record, raw), End)]
+    records = [raw for raw in Records(journal) if not isinstance(decode_any(Record, raw), End)]
     with supervised(left, records) as (process, supervisor):
         supervisor.core.finish("lost vhub", failed=True)
         process.add(supervisor)

@@ -19,7 +19,7 @@ from foosim.launcher.resume import check_journals, plan_again
 from foosim.launcher.run_options import RunOptions, launch_of, launched_options
 from foosim.protocol import channels
 from foosim.runtime import journal as journal_module
-from foosim.runtime.journal import Journal, journal_files, read_records
+from foosim.runtime.journal import Journal, Records, journal_files
 from foosim.runtime.run_folder import LAUNCH_FILE, LAUNCHER_FILE, RunFolder, create_run
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
@@ -59,7 +59,7 @@ def folder(run: tuple[bytes, dict[str, list[bytes]]], tmp_path: Path, monkeypatc
 def damage(folder: RunFolder, stem: str, record: int) -> str:
     """Flip a bit in the midst of a record; return where it stands."""
     (path,) = journal_files(folder.journals, stem)
-    records = read_records(path)
+    records = Records(path)
     starts = [records.valid_bytes, *(records.valid_bytes for _ in records)]
     content = bytearray(path.read_bytes())
     content[(starts[record] + starts[record + 1]) // 2] ^= 1
@@ -128,7 +128,7 @@ def test_a_damaged_record_is_told_with_the_command_that_begins_a_new_run(
 
 def test_a_journal_whose_only_record_is_damaged_is_said_to_have_none(folder: RunFolder) -> None:
     (path,) = journal_files(folder.journals, channels.SUPERVISOR)
-    records = read_records(path)
+    records = Records(path)
     next(records)
     path.write_bytes(path.read_bytes()[: records.valid_bytes - 1])
     what = f"no file of the journal of supervisor in {folder.journals} has a whole record"

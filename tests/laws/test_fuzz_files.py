@@ -24,11 +24,11 @@ from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Answer, Request
-from foosim.runtime.journal import Journal, read_records
+from foosim.runtime.journal import Journal, Records
 from foosim.runtime.run_folder import RunFolder, RunInfo
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
-from foosim.vhub.state.records import fold
+from foosim.vhub.state.records import Fold
 from foosim.world.bodies.visual_meshes import drawn_content, drawn_parts
 from foosim.world.matter.mesh import AssetError
 from foosim.world.mesh_files import read_mesh
@@ -219,7 +219,7 @@ def test_spoiled_journals_end_where_they_were_spoiled(
             yield content[:100]
             path.write_bytes(content)
             try:
-                records = list(read_records(path))
+                records = list(Records(path))
             except Refused:
                 continue
             assert records == captured.records[: len(records)]
@@ -237,7 +237,7 @@ def test_spoiled_records_of_a_journal_are_refused_by_the_fold(fuzz: Fuzz, captur
             records[at] = spoil(rng, records[at])
             yield records[at]
             try:
-                for _ in fold(captured.deployment, records):
+                for _ in Fold(captured.deployment, records):
                     pass
             except Refused:
                 continue

@@ -166,7 +166,7 @@ class _Forgetful(HubCore):
 
     def begin(self, past: Any, now_ns: int) -> None:
         if past is not None:
-            for member in past.state.members.values():
+            for member in past.fold.state.members.values():
                 member.downlink += 1
         super().begin(past, now_ns)
 

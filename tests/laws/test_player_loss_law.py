@@ -24,7 +24,7 @@ from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.simulation.what_if import what_if
 from foosim.vhub.core import HubCore
-from foosim.vhub.state.records import AbsencesRecord, HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.state.records import AbsencesRecord, Fold, HubRecord, InputsRecord, TickRecord
 from tests.deployed import TABLE, TEXT
 from tests.turns import BY_PERIOD
 
@@ -79,8 +79,8 @@ class Run:
         assert verify_capture(self.path, 3).equal
         state = self.system.hub.state
         assert state is not None
-        *_, (folded, _) = fold(state.deployment, self.records)
-        assert folded.snapshot() == state.snapshot()
+        fold = Fold(state.deployment, self.records)
+        assert [*fold] and fold.state.snapshot() == state.snapshot()
         assert what_if(open_capture(self.path)).changed == 0
         assert state.packets.refused == 0, state.refusals
 

@@ -17,10 +17,10 @@ from foosim.runtime.journal import (
     Journal,
     JournalDamaged,
     JournalError,
+    Records,
     journal_files,
     read_journal,
     read_newest,
-    read_records,
 )
 
 RECORDS = [b"", b"\x00", b"first", bytes(range(256)) * 2, b"\xff" * 7, b"last"]
@@ -43,7 +43,7 @@ def flip(path: Path, place: int) -> None:
 
 def places(path: Path) -> list[int]:
     """Where the records of a whole file start, and where the last one ends."""
-    records = read_records(path)
+    records = Records(path)
     return [records.valid_bytes, *(records.valid_bytes for _ in records)]
 
 
@@ -53,7 +53,7 @@ def started_again(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_records_are_read_as_they_were_written(tmp_path: Path) -> None:
-    records = read_records(written(tmp_path, RECORDS))
+    records = Records(written(tmp_path, RECORDS))
     assert list(records) == RECORDS
     assert records.left_bytes == 0
     assert list(records) == []
@@ -63,7 +63,7 @@ def test_a_record_is_in_the_file_when_append_returns(tmp_path: Path) -> None:
     with Journal(tmp_path, "hub") as journal:
         for count, record in enumerate(RECORDS, 1):
             journal.append(record)
-            assert list(read_records(journal.path)) == RECORDS[:count]
+            assert list(Records(journal.path)) == RECORDS[:count]
 
 
 def test_a_killed_process_loses_nothing(tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_a_file_torn_at_any_byte_gives_the_records_before(tmp_path: Path) -> Non
     assert ends[-1] == len(content)
     for size in range(len(content)):
         path.write_bytes(content[:size])
-        records = read_records(path)
+        records = Records(path)
         whole = sum(end <= size for end in ends) - 1
         assert list(records) == RECORDS[: max(0, whole)], size
         assert records.left_bytes == size - (ends[whole] if whole >= 0 else 0), size
@@ -102,7 +102,7 @@ def test_a_corrupt_last_record_ends_the_file(tmp_path: Path, place: int) -> None
     """In its payload, its checksum, its length, its mark, its opening: nothing tells it from one that is torn."""
     path = written(tmp_path, RECORDS)
     flip(path, path.stat().st_size + place)
-    records = read_records(path)
+    records = Records(path)
     assert list(records) == RECORDS[:-1]
     assert records.left_bytes == FRAMING_BYTES + 4
 
@@ -110,12 +110,12 @@ def test_a_corrupt_last_record_ends_the_file(tmp_path: Path, place: int) -> None
 def test_what_is_no_journal_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "hub-000001.journal"
     with pytest.raises(JournalError, match=r"hub-000001\.journal: cannot be read, No such file"):
-        read_records(path)
+        Records(path)
     path.write_bytes(b"foosim journal 1\n")
     with pytest.raises(JournalError, match="no journal of this version, its first bytes are b'foosim journal 1"):
-        read_records(path)
+        Records(path)
     path.write_bytes(b"")
-    assert list(read_records(path)) == []
+    assert list(Records(path)) == []
 
 
 def test_a_second_writer_is_kept_out_until_the_first_is_gone(tmp_path: Path) -> None:
@@ -137,13 +137,13 @@ def test_a_full_file_is_followed_by_one_that_starts_with_the_head(tmp_path: Path
             journal.append(b"tick %02d" % tick)
             journal.rotate_if_full(partial(bytes.__mod__, b"head after %02d", tick), tick)
         assert len(journal_files(tmp_path, "hub")) == 25
-    starts = [next(read_records(path)) for path in journal_files(tmp_path, "hub")]
+    starts = [next(Records(path)) for path in journal_files(tmp_path, "hub")]
     assert starts[0] == b"tick 00"
     assert starts[1:] == sorted(starts[1:]) and all(start.startswith(b"head after") for start in starts[1:])
     ticks = [record for record in read_journal(tmp_path, "hub") if record.startswith(b"tick")]
     assert ticks == [b"tick %02d" % tick for tick in range(100)]
     for path, start in zip(journal_files(tmp_path, "hub")[1:], starts[1:], strict=True):
-        following = list(read_records(path))[1:2]
+        following = list(Records(path))[1:2]
         assert following in ([b"tick %02d" % (int(start[-2:]) + 1)], [])
 
 
@@ -164,7 +164,7 @@ def test_files_go_once_nobody_needs_them(tmp_path: Path) -> None:
         journal.forget_before(10**9)
         assert journal_files(tmp_path, "hub") == [journal.path]
         journal.append(b"more")
-        assert list(read_records(journal.path))[-1] == b"more"
+        assert list(Records(journal.path))[-1] == b"more"
 
 
 def test_the_disk_is_told_each_interval_and_at_the_end(tmp_path: Path) -> None:
@@ -200,7 +200,7 @@ def test_a_full_disk_ends_the_journal_between_two_records(tmp_path: Path) -> Non
     lines = done.stdout.splitlines()
     assert len(lines) == 2 and lines[0] == lines[1]
     assert lines[0].endswith("hub-000001.journal: cannot be written, File too large")
-    records = read_records(tmp_path / "hub-000001.journal")
+    records = Records(tmp_path / "hub-000001.journal")
     assert list(records) == [b"whole"]
     assert records.left_bytes == 0
 
@@ -215,7 +215,7 @@ def test_every_bad_bit_before_the_last_record_is_damage(tmp_path: Path) -> None:
         path.write_bytes(content)
         flip(path, place)
         with pytest.raises(JournalDamaged) as caught:
-            list(read_records(path))
+            list(Records(path))
         at = sum(start <= place for start in starts) - 1
         told = f"byte {starts[at]}: record {at + 1} is damaged, " if at >= 0 else "byte 17: the head of the file is"
         assert str(caught.value).startswith(f"{path}: {told}"), place
@@ -241,10 +241,10 @@ def test_a_hole_that_was_not_synced_is_an_end_on_a_machine_that_was_started_agai
         content[start:stop] = hole
         path.write_bytes(content)
         with pytest.raises(JournalDamaged, match="record 41 is damaged, 59 whole records after it"):
-            list(read_records(path))
+            list(Records(path))
         with monkeypatch.context() as patch:
             started_again(patch)
-            assert len(list(read_records(path))) == len(list(read_journal(tmp_path, "hub"))) == 40
+            assert len(list(Records(path))) == len(list(read_journal(tmp_path, "hub"))) == 40
 
 
 def test_what_was_synced_before_a_later_record_is_damage_on_any_machine(
@@ -264,10 +264,10 @@ def test_what_was_synced_before_a_later_record_is_damage_on_any_machine(
         journal.path.write_bytes(content)
         flip(journal.path, place)
         with pytest.raises(JournalDamaged, match=r"record \d+ is damaged"):
-            list(read_records(journal.path))
+            list(Records(journal.path))
     journal.path.write_bytes(content)
     flip(journal.path, starts[-2])
-    assert len(list(read_records(journal.path))) == len(starts) - 2
+    assert len(list(Records(journal.path))) == len(starts) - 2
 
 
 def test_the_end_of_a_full_file_is_judged_by_the_files_behind_it(
@@ -280,7 +280,7 @@ def test_the_end_of_a_full_file_is_judged_by_the_files_behind_it(
     with Journal(tmp_path, "hub") as journal:
         journal.append(b"opened again")
     files, whole = journal_files(tmp_path, "hub"), list(read_journal(tmp_path, "hub"))
-    first = list(read_records(files[0]))
+    first = list(Records(files[0]))
     content = files[0].read_bytes()
     torn = content[: places(files[0])[-2] + 5]
     for left, record in ((torn, len(first)), (b"", 1), (bytes(len(content)), 1)):
@@ -308,9 +308,9 @@ def test_a_record_of_another_place_or_another_journal_is_none(tmp_path: Path) ->
     starts = places(path)
     content, foreign = path.read_bytes(), other.read_bytes()
     path.write_bytes(content[: starts[3]] + foreign[starts[3] :])
-    assert list(read_records(path)) == RECORDS[:3]
+    assert list(Records(path)) == RECORDS[:3]
     path.write_bytes(content + content[starts[2] : starts[3]])
-    assert list(read_records(path)) == RECORDS
+    assert list(Records(path)) == RECORDS
 
 
 def test_a_file_that_did_not_come_to_the_disk_leaves_the_one_before(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from foosim.simulation.run import Rehearsed, rehearse, with_nodes
 from foosim.simulation.system import Settings, System
 from foosim.simulation.verify import verify_capture
 from foosim.supervisor import records
-from foosim.vhub.state.records import fold
+from foosim.vhub.state.records import Fold
 from foosim.world.assembly.initial_state import first_frame, start_with
 from foosim.world.frame import Frame
 from foosim.world.start import Start
@@ -102,7 +102,7 @@ def assert_journals(run: Rehearsed, told: list[tuple[str, bytes]], tick: int) ->
     deployment = load_deployment(with_nodes(TEXT, TABLE.name, 3, ["engine=pure", "players={}"]), TABLE.name)
     history = records.fold(deployment, [record for process, record in told if process == "supervisor"])
     assert history.frame.digest == run.digests[-1] and history.frame.tick == TICKS
-    closed = [closing for _, closing in fold(deployment, [record for process, record in told if process == "vhub"])]
+    closed = [folded.closing for folded in Fold(deployment, [record for process, record in told if process == "vhub"])]
     assert [closing.frame.tick for closing in closed] == list(range(tick, TICKS))
     assert [closing.digest for closing in closed[1:]] == run.digests[:-1]
 

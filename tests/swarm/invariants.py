@@ -23,8 +23,7 @@ from foosim.simulation.system import System
 from foosim.supervisor.records import CommitRecord, OrderedRecord, RecoveredRecord, RequestRecord
 from foosim.supervisor.records import Record as SupervisorRecord
 from foosim.supervisor.records import fold as fold_supervisor
-from foosim.vhub.state.records import Closing, HubRecord, TickRecord
-from foosim.vhub.state.records import fold as fold_hub
+from foosim.vhub.state.records import Closing, Fold, HubRecord, TickRecord
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, chain_next
@@ -273,7 +272,6 @@ class Laws:
         hold(kept.owners == supervisor.state.owners and not kept.edits, "other owners or edits are folded")
         state = system.hub.state
         assert state is not None
-        for folded, _ in fold_hub(self._deployment, self._journals[channels.VHUB]):
-            last = folded
-        hold(last.snapshot() == state.snapshot(), "the vHub's journal gives another state")
+        fold = Fold(self._deployment, self._journals[channels.VHUB])
+        hold([*fold] != [] and fold.state.snapshot() == state.snapshot(), "the vHub's journal gives another state")
         self.packets.end(system)

@@ -135,7 +135,7 @@ def resume(path: Path, run: HubRun, records: Sequence[bytes]) -> None:
         if epoch.epoch > known:
             writer.keep(epoch)
     for closing in run.closings:
-        if closing.frame.tick > past.state.closed:
+        if closing.frame.tick > past.fold.state.closed:
             writer.keep(closing)
     writer.finish({"reason": "enough"})
     found, capture = writer.statistics(), open_capture(path)
@@ -246,9 +246,9 @@ def test_a_run_that_ends_where_its_journal_does_loses_nothing(chunked: bytes, hu
     described = hub_run.deployment, NAME, hub_run.text, METADATA
     writer = Recorder(file, *described, None, first_tick_of(hub_run.deployment, records))
     past = recall(hub_run.deployment, "run-1", records, writer.begun_with, 0)
-    assert past is not None and not past.kept and past.state.closed == 20 < writer.begun_with.tick
+    assert past is not None and not past.kept and past.fold.state.closed == 20 < writer.begun_with.tick
     assert past.committed is not None
-    end = Closing(past.committed[2], past.committed[2].digest, [], [], fates=past.state.in_flight())
+    end = Closing(past.committed[2], past.committed[2].digest, [], [], fates=past.fold.state.in_flight())
     for _ in range(2):
         writer.keep(end)
     writer.finish({"reason": "lost vhub"})

@@ -16,7 +16,7 @@ from foosim.protocol.codec import decode, encode
 from foosim.protocol.messages import Deliveries, Sent, Up
 from foosim.runtime.journal import Journal, JournalError, read_journal
 from foosim.vhub.state.hub_state import HubState
-from foosim.vhub.state.records import fold
+from foosim.vhub.state.records import Fold
 from foosim.world.robot_packets import RobotPacket
 from tests.links.offered import Hub, deployment_of
 from tests.vhub.conftest import Driver, HubRun, drive, write_capture
@@ -93,7 +93,8 @@ def test_a_flood_is_refused_and_dropped_and_counted_and_fits_into_every_message(
     with Journal(tmp_path, "vhub") as journal:
         for record in run.journal:
             journal.append(record)
-    assert [again.snapshot() for again, _ in fold(driver.deployment, run.journal)][-1] == run.snapshots[-1]
+    again = Fold(driver.deployment, run.journal)
+    assert [*again] and again.state.snapshot() == run.snapshots[-1]
 
 
 def test_a_flood_costs_others_no_packet() -> None:

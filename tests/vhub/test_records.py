@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
@@ -16,10 +17,10 @@ from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.protocol.codec import decode, decode_any, encode
 from foosim.protocol.messages import Deliveries, Down, Epoch
-from foosim.runtime.journal import Journal, journal_files, read_journal, read_records
+from foosim.runtime.journal import Journal, Records, journal_files, read_journal
 from foosim.vhub.recording.rows_of_closing import packet_entry, world_rows
 from foosim.vhub.state.hub_state import HubState
-from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, InputsRecord, TickRecord, fold
+from foosim.vhub.state.records import Closing, Fold, HeadRecord, HubRecord, InputsRecord, TickRecord
 from foosim.vhub.state.resume import recall
 from foosim.world.frame import CHAIN_START, Frame, chain_next
 from tests.vhub.conftest import EPOCH_AT
@@ -62,10 +63,17 @@ def test_the_run_has_everything_in_it(hub_run: HubRun) -> None:
     assert all(HubState.restore(hub_run.deployment, snapshot).in_flight() for snapshot in hub_run.snapshots[1:])
 
 
+def snapshots(hub_run: HubRun, records: Iterable[bytes]) -> list[bytes]:
+    fold = Fold(hub_run.deployment, records)
+    return [fold.state.snapshot() for _ in fold]
+
+
 def test_a_fold_gives_the_hub_at_every_record(hub_run: HubRun) -> None:
     known = None
     count = 0
-    for tick, (state, closing) in enumerate(fold(hub_run.deployment, hub_run.records)):
+    fold = Fold(hub_run.deployment, hub_run.records)
+    state = fold.state
+    for tick, (closing, *_) in enumerate(fold):
         live = hub_run.closings[tick]
         assert state.snapshot() == hub_run.snapshots[tick], tick
         record = decode_any(HubRecord, hub_run.records[tick + 1])
@@ -85,7 +93,7 @@ def test_a_fold_gives_the_hub_at_every_record(hub_run: HubRun) -> None:
 @pytest.mark.parametrize("first", range(0, 63, 7))
 def test_a_fold_from_any_head_goes_on_equally(hub_run: HubRun, first: int) -> None:
     records = [head_of(hub_run, first), *hub_run.records[first + 2 :]]
-    states = [state.snapshot() for state, _ in fold(hub_run.deployment, records)]
+    states = snapshots(hub_run, records)
     assert states == hub_run.snapshots[first + 1 :]
 
 
@@ -101,21 +109,21 @@ def test_files_that_turn_and_go_fold_to_the_same_hub(hub_run: HubRun, tmp_path: 
             journal.rotate_if_full(partial(head_of, hub_run, tick), tick)
         files = journal_files(tmp_path, "vhub")
         assert len(files) > 4
-        whole = [state.snapshot() for state, _ in fold(hub_run.deployment, read_journal(tmp_path, "vhub"))]
+        whole = snapshots(hub_run, read_journal(tmp_path, "vhub"))
         assert whole == hub_run.snapshots
         for path, following in pairwise(files):
-            records = chain(read_records(path), read_records(following))
-            states = [state.snapshot() for state, _ in fold(hub_run.deployment, records)]
+            records = chain(Records(path), Records(following))
+            states = snapshots(hub_run, records)
             at = hub_run.snapshots.index(states[0])
             assert states == hub_run.snapshots[at : at + len(states)]
         journal.forget_before(50)
-        rest = [state.snapshot() for state, _ in fold(hub_run.deployment, read_journal(tmp_path, "vhub"))]
+        rest = snapshots(hub_run, read_journal(tmp_path, "vhub"))
         assert 14 <= len(rest) < 64 and rest == hub_run.snapshots[-len(rest) :]
 
 
 def test_records_that_are_no_run_are_refused(hub_run: HubRun) -> None:
     def folded(records: list[bytes]) -> int:
-        return sum(1 for _ in fold(hub_run.deployment, records))
+        return sum(1 for _ in Fold(hub_run.deployment, records))
 
     assert folded(hub_run.records[:1]) == 0
     with pytest.raises(Malformed):
@@ -135,7 +143,7 @@ def test_records_that_are_no_run_are_refused(hub_run: HubRun) -> None:
 def test_a_vhub_that_is_started_again_knows_what_the_one_before_knew(hub_run: HubRun, captured: int | None) -> None:
     told = None if captured is None else Progress(captured, epoch=1 if captured >= 0 else -1)
     past = recall(hub_run.deployment, "run-1", hub_run.journal, told, limits.DOWNLINK_KEPT_NS)
-    assert past is not None and past.state.snapshot() == hub_run.snapshots[-1]
+    assert past is not None and past.fold.state.snapshot() == hub_run.snapshots[-1]
     assert past.epoch == hub_run.epochs[-1] and past.committed is not None and past.committed[1].tick == 63
     for tick, payload in past.sent.items():
         assert hub_run.deliveries.get(tick, [payload]) == [payload], "byte for byte"
@@ -159,8 +167,8 @@ def test_a_vhub_that_is_started_again_knows_what_the_one_before_knew(hub_run: Hu
 def test_what_joins_and_leaves_is_written_before_its_go_is_said(hub_run: HubRun) -> None:
     cut = max(i for i, raw in enumerate(hub_run.journal) if isinstance(decode_any(HubRecord, raw), InputsRecord))
     past = recall(hub_run.deployment, "run-1", hub_run.journal[: cut + 1], None, 0)
-    assert past is not None and past.inputs is not None and past.inputs.tick == past.state.closed + 1
-    assert [joining.name for joining in past.inputs.joins] == ["watcher"]
+    assert past is not None and past.fold.inputs is not None and past.fold.inputs.tick == past.fold.state.closed + 1
+    assert [joining.name for joining in past.fold.inputs.joins] == ["watcher"]
 
 
 def test_the_journal_of_another_run_is_refused_and_one_behind_its_capture_is_not(hub_run: HubRun) -> None:

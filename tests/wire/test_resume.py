@@ -19,7 +19,7 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.resume import plan_again
 from foosim.launcher.run_options import RunOptions
 from foosim.protocol import channels
-from foosim.runtime.journal import journal_files, read_records
+from foosim.runtime.journal import Records, journal_files
 from foosim.runtime.run_folder import RunFolder, open_run
 from foosim.simulation.run import rehearse
 from foosim.simulation.verify import verify_capture
@@ -36,7 +36,7 @@ BARE = tuple(word for setting in SETS for word in ("--set", setting))
 def tear(folder: Path, stem: str, count: int) -> None:
     """Cut the last records off a journal, as a machine does that loses its power."""
     path = journal_files(folder, stem)[-1]
-    records = read_records(path)
+    records = Records(path)
     ends = [records.valid_bytes for _ in records]
     os.truncate(path, ends[-count])
 

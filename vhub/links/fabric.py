@@ -33,7 +33,7 @@ from foosim.vhub.stages import STAGES
 from foosim.vhub.stages.custom_model import CustomModel
 from foosim.vhub.stages.delay import Delay
 from foosim.vhub.stages.queue import Queue
-from foosim.vhub.stages.stage import at_arrival, at_sending
+from foosim.vhub.stages.stage import Stage
 from foosim.world.frame import Frame
 
 LinkKey = tuple[str, str, str]
@@ -52,7 +52,8 @@ class Settled:
         self.stages = (
             [stage for _, make, _ in STAGES if (stage := make(setup)) is not None] if setup is not None else []
         )
-        self.at_sending, self.at_arrival = at_sending(self.stages), at_arrival(self.stages)
+        self.at_sending = [stage for stage in self.stages if type(stage).at_sending is not Stage.at_sending]
+        self.at_arrival = [stage for stage in self.stages if type(stage).at_arrival is not Stage.at_arrival]
         self.slots = 0 if setup is None else slots_of(setup.settings, is_radio=setup.is_radio)
         shares = setup is None or setup.is_radio or any(isinstance(stage, Queue | CustomModel) for stage in self.stages)
         self.is_apart = not shares

@@ -45,9 +45,9 @@ class Flow:
         return f"{self.source}>{self.destination}" if self.profile.is_own_queue else self.source
 
     @property
-    def is_once_for_all(self) -> bool:
-        """Whether the radio broadcasts it: it is sent once for all receivers."""
-        return self.channel != "" and self.profile.settings.is_on_air and self.profile.settings.published == "broadcast"
+    def to(self) -> str:
+        """Its receiver; nobody for a broadcast, which is sent once for all."""
+        return "" if self.channel and self.profile.settings.sends_once else self.destination
 
 
 def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
@@ -75,9 +75,7 @@ def used_links(flows: Iterable[Flow]) -> dict[Key, set[Pair]]:
 
 def offered_hz(flows: Iterable[Flow]) -> dict[Key, float]:
     """Return the frames per second on an air, or without one of the busiest queue, by settings."""
-    once = {
-        (flow.key, flow.queue, "" if flow.is_once_for_all else flow.destination, flow.channel): flow for flow in flows
-    }
+    once = {(flow.key, flow.queue, flow.to, flow.channel): flow for flow in flows}
     queues: dict[Key, dict[str, float]] = {}
     on_air: dict[Key, bool] = {}
     for flow in once.values():

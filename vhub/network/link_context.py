@@ -72,5 +72,4 @@ class LinkSetup:
 
     @property
     def sends_once(self) -> bool:
-        """Whether a broadcast is sent once for all its receivers; a base station sends to each by itself."""
-        return self.is_radio and self.settings.published == "broadcast" and self.settings.medium != "lte"
+        return self.settings.sends_once

@@ -35,7 +35,7 @@ from foosim.runtime.journal import JournalError, journal_files, lock_journal, re
 from foosim.vhub.network.packet import IN_FLIGHT
 from foosim.vhub.recording.rows_of_closing import tick_of
 from foosim.vhub.state.hub_state import HubState
-from foosim.vhub.state.records import Closing, HeadRecord, HubRecord, fold
+from foosim.vhub.state.records import Closing, Fold, HeadRecord, HubRecord
 
 UNCLEAN: Final = "unclean end"
 
@@ -158,8 +158,10 @@ class _Completion:
             return
         last: tuple[HubState, Closing] | None = None
         try:
-            for last in fold(self._deployment, self._folded(file)):
-                file.write(tick_of(last[1], self._deployment))
+            fold = Fold(self._deployment, self._folded(file))
+            for folded in fold:
+                last = fold.state, folded.closing
+                file.write(tick_of(folded.closing, self._deployment))
                 file.end_large_chunk()
         except (Malformed, JournalError) as error:
             self.problem = f"its journal cannot be used to its end: {error}"

@@ -387,11 +387,25 @@ def _wifi_frames(modes: tuple[str, ...], timing: WifiTiming, fixed: str | None) 
     return WifiFrames(modes, timing, fixed)
 
 
-class WiFi(OnAir):
-    """IEEE 802.11 with the distributed coordination function and rate control."""
+class Contending(OnAir):
+    """Common part of media whose stations contend for each acknowledged frame."""
 
     is_acknowledged = True
     takes_turns = True
+
+    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
+        if len(sizes) == 1:
+            return self._access(flight, broadcast, sizes[0], max(0, flight.frames - 1), lost)
+        found = [self._access(flight, broadcast, size, frame, lost) for frame, size in enumerate(sizes)]
+        return in_a_row([access for access, _ in found]), sum([airtime_ns for _, airtime_ns in found])
+
+    def _access(self, flight: Flight, broadcast: bool, size: int, number: int, lost: int | None) -> tuple[Access, int]:
+        """Return access and airtime of one frame of a packet."""
+        raise NotImplementedError
+
+
+class WiFi(Contending):
+    """IEEE 802.11 with the distributed coordination function and rate control."""
 
     def __init__(self, setup: LinkSetup) -> None:
         super().__init__(setup)
@@ -416,14 +430,8 @@ class WiFi(OnAir):
         known.ready_ns, known.turn_ns = ready_ns, turn_ns
         known.radio, known.hears = self._setup.radio, self._contest.hears
 
-    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
-        """The fixed rate if set; else the lowest for a broadcast, the highest with few errors for a unicast."""
-        if len(sizes) == 1:
-            return self._access(flight, broadcast, sizes[0], max(0, flight.frames - 1), lost)
-        found = [self._access(flight, broadcast, size, frame, lost) for frame, size in enumerate(sizes)]
-        return in_a_row([access for access, _ in found]), sum([airtime_ns for _, airtime_ns in found])
-
     def _access(self, flight: Flight, broadcast: bool, size: int, number: int, lost: int | None) -> tuple[Access, int]:
+        """The fixed rate if set; else the lowest for a broadcast, the highest with few errors for a unicast."""
         ack_ns, threshold = 0, 0
         if broadcast:
             frame = self._frames.broadcast(size)
@@ -441,11 +449,8 @@ class WiFi(OnAir):
         return wifi_contention(contenders, self._timing, unicast=not broadcast).threshold, 0
 
 
-class LrWpan(OnAir):
+class LrWpan(Contending):
     """IEEE 802.15.4 at 2.4 GHz without beacons."""
-
-    is_acknowledged = True
-    takes_turns = True
 
     def __init__(self, setup: LinkSetup) -> None:
         super().__init__(setup)
@@ -453,12 +458,6 @@ class LrWpan(OnAir):
 
     def turn(self, ready_ns: int) -> tuple[int, int]:
         return self._air.turn(self._setup.source, ready_ns, self._budget.propagation)
-
-    def access(self, flight: Flight, broadcast: bool, sizes: Sequence[int], lost: int | None) -> tuple[Access, int]:
-        if len(sizes) == 1:
-            return self._access(flight, broadcast, sizes[0], max(0, flight.frames - 1), lost)
-        found = [self._access(flight, broadcast, size, frame, lost) for frame, size in enumerate(sizes)]
-        return in_a_row([access for access, _ in found]), sum([airtime_ns for _, airtime_ns in found])
 
     def _access(self, flight: Flight, broadcast: bool, size: int, number: int, lost: int | None) -> tuple[Access, int]:
         flight.rate_bps = errors.MODES[LRWPAN_MODE].rate_bps

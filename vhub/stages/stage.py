@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from mypy_extensions import mypyc_attr
 
 from foosim.vhub.network.packet import Flight
@@ -27,13 +25,3 @@ class Stage:
 
     def explain(self, seen: Seen, note: Explanation) -> None:
         """Tell what the stage looked at in a captured packet; what its row does not have is computed again."""
-
-
-def at_sending(stages: Iterable[Stage]) -> list[Stage]:
-    """Return the stages that have a hook of their own at sending, in their order."""
-    return [stage for stage in stages if type(stage).at_sending is not Stage.at_sending]
-
-
-def at_arrival(stages: Iterable[Stage]) -> list[Stage]:
-    """Return the stages that have a hook of their own at arrival, in their order."""
-    return [stage for stage in stages if type(stage).at_arrival is not Stage.at_arrival]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -211,11 +211,9 @@ def missing_robots(samples: Iterable[Samples], digest: bytes, frame: Frame) -> l
     return [robot.name for robot in frame.layout.robots if robot.name not in covered]
 
 
-@dataclass(frozen=True, slots=True)
-class Folded:
-    """One closing that a fold computed again: the state after it, its record, the packets released to each client."""
+class Folded(NamedTuple):
+    """One closing that a fold computed again: its record, and the packets released to each client."""
 
-    state: HubState
     closing: Closing
     record: TickRecord
     released: dict[str, list[Flight]]
@@ -284,16 +282,7 @@ class Fold:
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
         self.commit, self.inputs = record.commit, None
-        return Folded(state, closing, record, released)
-
-
-def fold(deployment: Deployment, records: Iterable[bytes]) -> Iterator[tuple[HubState, Closing]]:
-    """Yield the state and the closing after every tick record; the first record is a head.
-
-    Raises Malformed unless the records are of one run of this version.
-    """
-    for folded in Fold(deployment, records):
-        yield folded.state, folded.closing
+        return Folded(closing, record, released)
 
 
 def count_downlinks(state: HubState, tick: int, released: dict[str, list[Flight]]) -> None:

@@ -21,34 +21,24 @@ from foosim.vhub.network.packet import received
 from foosim.vhub.state.commits import Committed
 from foosim.vhub.state.hub_state import HubState
 from foosim.vhub.state.records import (
-    NONE_AWAY,
-    AbsencesRecord,
     Closing,
     Fold,
     Folded,
     HeadRecord,
     HubRecord,
-    InputsRecord,
     TickRecord,
 )
-from foosim.world.frame import CHAIN_START, Frame, frame_from_bytes
-from foosim.world.layout import Layout
+from foosim.world.frame import Frame, frame_from_bytes
 
 
 @dataclass(slots=True)
 class Past:
-    """The vHub after its last record, and the messages that it had sent."""
+    """The vHub after its last record, as the fold of its journal ended, and the messages that it had sent."""
 
-    state: HubState
-    layout: Layout
+    fold: Fold
     committed: Committed | None = None
     """The commit of the last closed tick; None before the first."""
-    chain: bytes = CHAIN_START
-    machine: str = ""
-    """The boot of the machine that the journal names."""
     epoch: Epoch | None = None
-    inputs: InputsRecord | None = None
-    absences: AbsencesRecord = NONE_AWAY
     sent: dict[int, bytes] = field(default_factory=dict)
     """Deliveries by tick, as they were published or as others take them to be."""
     published: bytes = b""
@@ -66,7 +56,7 @@ class Past:
         """Return the first actions: complete the capture, log the position."""
         actions: list[Action | Closing | Epoch] = [*self.kept]
         if self.epoch is not None:
-            actions.append(Log("info", f"resumes after tick {self.state.closed} in epoch {self.epoch.epoch}"))
+            actions.append(Log("info", f"resumes after tick {self.fold.state.closed} in epoch {self.epoch.epoch}"))
         return actions
 
 
@@ -87,7 +77,7 @@ def recall(
         raise Malformed(f"the journal of the vHub is {whose}, this is run {run}")
     start = _start(found, captured, max(limits.KEPT_TICKS, kept_ns // deployment.tick_ns))
     fold = Fold(deployment, records[start:])
-    past = Past(fold.state, fold.layout)
+    past = Past(fold)
     _remember(past, *_deliveries_of(fold.state))
     if captured is not None and captured.tick == fold.state.closed:
         known = _frame(fold)
@@ -103,8 +93,6 @@ def recall(
             past.known = folded.closing
     if captured is not None:
         past.kept = list(_not_captured(found, closings, captured.epoch))
-    past.layout, past.inputs, past.chain, past.machine = fold.layout, fold.inputs, fold.chain, fold.machine
-    past.absences = fold.absences
     past.epoch = decode(Epoch, fold.epoch) if fold.epoch else None
     frame = _frame(fold)
     if frame is not None:
@@ -152,16 +140,16 @@ def _deliveries_of(state: HubState) -> tuple[int, bytes]:
 def _remember(past: Past, tick: int, payload: bytes) -> None:
     """Add the deliveries of a tick, and those after it where they are final."""
     past.sent[tick] = past.sent.get(tick, payload)
-    for following in range(tick + 1, past.state.final + 1):
+    for following in range(tick + 1, past.fold.state.final + 1):
         past.sent.setdefault(following, encode(Deliveries(following, [])))
     past.sent.pop(tick - limits.KEPT_TICKS, None)
-    if not past.state.was_final:
+    if not past.fold.state.was_final:
         past.published = payload
 
 
 def _number(past: Past, folded: Folded) -> None:
     """Add the downlinks of a tick outside of lockstep, with their numbers; an unanswered Go is a Down as well."""
-    tick, members, owing = folded.record.tick, folded.state.members, folded.record.owing
+    tick, members, owing = folded.record.tick, past.fold.state.members, folded.record.owing
     for name in sorted({*folded.released, *owing}):
         member = members[name]
         if name in owing or not member.is_due(tick):
