@@ -23,8 +23,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from foosim.client.commands import CommandEncoder
 from foosim.client.core import NEVER_NS, ClientCore, ClientStatistics
@@ -41,6 +40,7 @@ from foosim.client.packets import check_packet, check_subscription
 from foosim.client.player import Commands, Packet, Sample
 from foosim.client.playing import NS_PER_S, Newest
 from foosim.common import limits
+from foosim.common.closable import Closable
 from foosim.common.errors import BadValue, Malformed, UnknownName
 from foosim.common.names import is_name
 from foosim.deployment.channel_kinds import channel_codec, channels_of
@@ -232,18 +232,13 @@ class Link:
         self._session = session
         self._inbox = Inbox(limits.INBOX_MESSAGES_MAX)
         self._until_ns = NEVER_NS
-        self._wire = Wire(session, Plane.RADIO, self._inbox, core.name)
+        self.wire = Wire(session, Plane.RADIO, self._inbox, core.name)
         self._role = Role(core.name, core, _LOG, lambda now_ns: max(now_ns, min(core.deadline_ns(), self._until_ns)))
-        self._role.connect(self._wire)
+        self._role.connect(self.wire)
         self._role.on_alive, self._role.stood = self._on_alive, core.rest
         self._loop = Loop(self._inbox, _LOG)
         self._loop.add(self._role)
-        self._wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
-
-    def be_present(self) -> None:
-        """After the welcome, declare presence and watch that of the vHub."""
-        self._wire.declare_alive()
-        self._wire.watch_alive(VHUB)
+        self.wire.read(channels.CLIENT_READS, channels.CLIENT_WAITS)
 
     def perform(self) -> None:
         """Write the core's log lines."""
@@ -282,7 +277,7 @@ class Link:
             (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
 
 
-class Client:
+class Client(Closable):
     """One connection to a run. Made by `connect`; use it in `with`. When a lockstep client leaves, the run ends."""
 
     def __init__(self, link: Link, deployment: Deployment) -> None:
@@ -420,12 +415,6 @@ class Client:
     def close(self) -> None:
         """Leave the run. One that is in lockstep ends it, if it is not over."""
         self._link.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     # --- inside ------------------------------------------------------------------------------------------------------
 
@@ -623,7 +612,8 @@ def connect(
             raise ConnectionFailed(
                 f"no vHub answers at {session.locator} within {timeout_s:g} s: is it the radio plane's address?{who}"
             )
-        link.be_present()
+        link.wire.declare_alive()
+        link.wire.watch_alive(VHUB)
         return Client(link, core.deployment)
     except BaseException:
         session.close()

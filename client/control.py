@@ -8,10 +8,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Literal
 
 from foosim.client.requests import Take, Taken, answer_to, exchange
+from foosim.common.closable import Closable
 from foosim.common.errors import Failed, Refused
 from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.schema import Deployment
@@ -48,7 +48,7 @@ class NoAnswer(Failed):
     """The supervisor did not answer in time."""
 
 
-class Control:
+class Control(Closable):
     """A connection to one running supervisor. Use it in `with`."""
 
     def __init__(
@@ -74,12 +74,6 @@ class Control:
         self._wire = Wire(self._session, Plane.SIMULATION, self._inbox, self._name)
         self._wire.read(channels.OPERATOR_READS)
         self._requests = 0
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def close(self) -> None:
         self._session.close()

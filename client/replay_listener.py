@@ -17,11 +17,11 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final
 
 from foosim.client.errors import ConnectionFailed
 from foosim.common import limits
+from foosim.common.closable import Closable
 from foosim.common.errors import Malformed, Refused, UnknownName
 from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.channel_kinds import channel_codec
@@ -55,7 +55,7 @@ class ReplayGone(Refused):
     exit_code = 1
 
 
-class Replay:
+class Replay(Closable):
     """A connection to one replay. Use it in `with`; iterate over it, or `take`."""
 
     def __init__(self, session: Session, name: str, streams: Sequence[str]) -> None:
@@ -233,12 +233,6 @@ class Replay:
 
     def close(self) -> None:
         self._session.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
 
 def hear_replay(

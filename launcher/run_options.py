@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, get_type_hints
 
 import msgspec
 import typer
@@ -95,11 +95,7 @@ def launched_options(folder: RunFolder) -> RunOptions:
         known = {field.name for field in fields(RunOptions)}
         if unknown := sorted(set(msgspec.json.decode(launch.options)) - known):
             raise msgspec.ValidationError(f"there is no option {unknown[0]}")
-        return msgspec.json.decode(launch.options, type=RunOptions, dec_hook=_to_path)
+        return msgspec.json.decode(launch.options, type=RunOptions, dec_hook=lambda kind, value: kind(value))
     except msgspec.DecodeError as error:
         reason = f"{path} was written by another version of foosim, or is damaged: {error}"
         raise Refused(f"run {folder.name} cannot be resumed with its options: {reason}") from None
-
-
-def _to_path(kind: type, value: Any) -> Any:
-    return kind(value)

@@ -159,7 +159,9 @@ class Up:
         folder, display = self.folder, self.display
         first, *others = self.plan.processes.values()
         self._begin(first, None)
-        early = [] if self._is_resumed else [process for process in others if self._starts_early(process)]
+        remotes, launch_of = self._launcher.remotes, self.plan.deployment.launch_of
+        here = [process for process in others if process.name not in remotes and launch_of(process.name) == "local"]
+        early = [] if self._is_resumed else here
         for process in early:
             self._begin(process, None)
         display.say(f"run {folder.name}, logs in {folder.logs}")
@@ -194,10 +196,6 @@ class Up:
             fetch_capture(remote, self.folder.name, self.capture)
         except Failed as failed:
             self._not_home = str(failed)
-
-    def _starts_early(self, process: Process) -> bool:
-        name = process.name
-        return name not in self._launcher.remotes and self.plan.deployment.launch_of(name) == "local"
 
     def _begin(self, process: Process, info: RunInfo | None) -> None:
         """Start a process, or print the command line of one that is started by hand."""

@@ -346,7 +346,8 @@ class Stepper:
             bad = [
                 (entity, why)
                 for entity in island
-                if before[entity.offsets["quarantined"]] <= 0.0 and (why := self._what_is_bad(entity, before, work))
+                if before[entity.offsets["quarantined"]] <= 0.0
+                and (why := _not_finite(entity, numbers) or self._problem(entity, before, work))
             ]
             if not bad:
                 continue
@@ -379,10 +380,6 @@ class Stepper:
         """Return in words why an entity's new, finite state is invalid; empty for a valid one."""
         numbers = work.numbers
         return self._limits.problem(entity, numbers, before) or self.world.problem(entity, numbers, before, work.tick)
-
-    def _what_is_bad(self, entity: Entity, before: Sequence[float], work: Work) -> str:
-        """Return in words why an entity's new state is invalid; empty for a valid one."""
-        return _not_finite(entity, work.numbers) or self._problem(entity, before, work)
 
 
 class Term:

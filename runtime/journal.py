@@ -30,11 +30,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import blake2b
 from pathlib import Path
-from types import TracebackType
 from typing import Final, Self
 from zlib import crc32
 
 from foosim.common import limits
+from foosim.common.closable import Closable
 from foosim.common.errors import Failed
 from foosim.runtime.process import machine_start
 
@@ -308,7 +308,7 @@ def lock_journal(folder: Path, stem: str) -> int:
     return lock
 
 
-class Journal:
+class Journal(Closable):
     """The one writer of a journal: files `STEM-000001.journal`, ... in `folder`; a new one at every opening.
 
     Raises JournalError when another process writes it or the disk refuses. After a failed write every further one
@@ -399,14 +399,6 @@ class Journal:
         os.close(self._lock_file)
         if self._error is not None:
             raise self._error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
 
     # --- files -------------------------------------------------------------------------------------------------------
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from foosim.capture.start_frame import read_branch
 from foosim.client.commands import CommandEncoder
 from foosim.client.player import Commands, Packet, Sample
+from foosim.common.closable import Closable
 from foosim.common.errors import BadValue, UnknownName
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
@@ -54,7 +55,7 @@ def _frame(deployment: Deployment, start: Start | Frame | str | None) -> Frame:
     return first_frame(deployment, read_branch(start, deployment).start if isinstance(start, str) else start)
 
 
-class Simulation:
+class Simulation(Closable):
     """A world and its network, stepped by the caller. Use it as a context, or `close` it.
 
     `tick`, `frame`, `status` and `readings` are the present frame's.
@@ -311,9 +312,3 @@ class Simulation:
         if self._world is not None:
             self._world.close()
             self._world = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -92,7 +92,8 @@ class NodeLoss:
             owners = dict.fromkeys(owners, name)
         owners.update((robot, name) for robot, node in state.returns.items() if node == name)
         away = {robot: node for robot, node in state.returns.items() if node != name}
-        state.note_recovery("join", name, "back" if self._was_lost(name) else "started")
+        was_lost = any(entry.what == "node" and entry.name == name for entry in state.recovered)
+        state.note_recovery("join", name, "back" if was_lost else "started")
         if self._freezes:
             if not state.members:
                 self._freeze(away)
@@ -150,9 +151,6 @@ class NodeLoss:
         """Whether the run ends without a node."""
         deployment = self._state.deployment
         return deployment.nodes[name].required or deployment.on_node_loss == "stop"
-
-    def _was_lost(self, name: str) -> bool:
-        return any(entry.what == "node" and entry.name == name for entry in self._state.recovered)
 
     def _freeze_of(self, lost: str) -> None:
         """Where configured, take the robots of a lost node out of service."""

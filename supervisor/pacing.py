@@ -23,7 +23,6 @@ class Pacer:
         self.last_lag_ns = 0
         self.anchor_ns = 0
         """Wall time of tick 0 at this pace."""
-        self.moved_ns = 0
         self.granted = 0
         """The tick up to which `step` allows while paused."""
 
@@ -70,7 +69,6 @@ class Pacer:
         if lag_ns <= limits.LAG_ANCHOR_NS:
             return 0
         self.anchor_ns += lag_ns
-        self.moved_ns += lag_ns
         return lag_ns
 
     def pause(self, next_tick: int) -> None:

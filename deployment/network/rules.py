@@ -32,13 +32,11 @@ Selector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_
 Moment = Annotated[int, Quantity(units.TIME, "0 s", "10000 h")]
 
 
-def _one_or_more(value: object) -> object:
-    return [value] if isinstance(value, str) else value
-
-
 Selectors = Annotated[
     list[Selector],
-    BeforeValidator(_one_or_more, json_schema_input_type=Selector | list[Selector]),
+    BeforeValidator(
+        lambda value: [value] if isinstance(value, str) else value, json_schema_input_type=Selector | list[Selector]
+    ),
     Field(min_length=1, max_length=SELECTORS_MAX),
 ]
 

@@ -237,18 +237,13 @@ def resolve(text: str) -> Scalar:
     if is_int or _FLOAT.fullmatch(text):
         if len(text) > NUMBER_LENGTH_MAX:
             raise ValueError(f"a number of more than {NUMBER_LENGTH_MAX} characters")
-        value = _integer(text) if is_int else float(text)
+        value = int(text, {"0o": 8, "0x": 16}.get(text[:2], 10)) if is_int else float(text)
         if math.isinf(value):
             raise ValueError("a number is finite")
         return value
     if _NOT_FINITE.fullmatch(text):
         raise ValueError("a number is finite")
     return text
-
-
-def _integer(text: str) -> int:
-    base = {"0o": 8, "0x": 16}.get(text[:2], 10)
-    return int(text, base)
 
 
 def plain(tree: Tree) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import fsum
+from operator import itemgetter
 
 from foosim.world.component_types.descriptions import NO_ENTITY, TOUCHES_MAX
 from foosim.world.layout import Entity
@@ -61,27 +62,16 @@ class TouchLog:
             began += (met.substeps & ~(met.substeps << 1 | is_lasting)).bit_count()
             first = (met.substeps & -met.substeps).bit_length() - 1
             found.append((-fsum(met.impulses), first, partner, link, met))
-        kept = sorted(found, key=_by_impulse)[:TOUCHES_MAX]
+        kept = sorted(found, key=itemgetter(0, 2, 3))[:TOUCHES_MAX]
         at = entity.offsets
         numbers[at["touches"]] = float(began)
-        for row, (impulse, first, partner, link, met) in enumerate(sorted(kept, key=_by_time)):
+        for row, (impulse, first, partner, link, met) in enumerate(sorted(kept, key=itemgetter(1, 2, 3))):
             numbers[at["touch_partners"] + row] = float(partner)
             numbers[at["touch_links"] + row] = float(link)
             numbers[at["touch_places"] + row] = met.place
             numbers[at["touch_starts"] + row] = float(first)
             numbers[at["touch_ends"] + row] = float(met.substeps.bit_length() - 1)
             numbers[at["touch_impulses"] + row] = -impulse
-
-
-_Row = tuple[float, int, int, int, _Met]
-
-
-def _by_impulse(row: _Row) -> tuple[float, int, int]:
-    return row[0], row[2], row[3]
-
-
-def _by_time(row: _Row) -> tuple[int, int, int]:
-    return row[1], row[2], row[3]
 
 
 def _lasting(entity: Entity, numbers: Sequence[float], substeps: int) -> list[tuple[float, float]]:

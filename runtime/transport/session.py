@@ -21,13 +21,13 @@ import time
 import weakref
 from collections.abc import Callable, Collection, Iterator
 from itertools import chain, repeat
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import zenoh
 
 from foosim.common import limits
 from foosim.common.addresses import parse_address, reachable
+from foosim.common.closable import Closable
 from foosim.common.errors import BadValue, Failed, show
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.runtime.transport.settings import QUERY_S, Security, client_settings, holds, router_settings
@@ -123,7 +123,7 @@ class _Attempt:
             _discard(self._outcome.get_nowait())
 
 
-class Session:
+class Session(Closable):
     """One session of a process. Use it in `with`; its declarations live as long as it does."""
 
     def __init__(self, session: zenoh.Session, locator: str, *, is_open_router: bool = False) -> None:
@@ -275,12 +275,6 @@ class Session:
         closer = _start_inside(self._close, "close")
         closer.join(CLOSE_S)
         return not closer.is_alive()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def _close(self) -> None:
         for declared in (*self._declared, *self._tokens.values()):

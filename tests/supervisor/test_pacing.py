@@ -75,7 +75,7 @@ def test_a_late_tick_is_counted_and_less_than_a_tenth_of_a_second_is_caught_up()
 def test_a_greater_lag_moves_the_anchor() -> None:
     made = pacer()
     lag = limits.LAG_ANCHOR_NS + 1
-    assert made.committed(5, START + 5 * T + lag) == lag == made.moved_ns
+    assert made.committed(5, START + 5 * T + lag) == lag
     assert made.release_ns(6) == START + 6 * T + lag, "the next ticks come at the pace, not in a burst"
     assert made.committed(6, START + 6 * T + lag + 7) == 0 and made.last_lag_ns == 7
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from math import inf, sqrt
+from operator import attrgetter
 from typing import Final, NamedTuple
 
 from foosim.world.kinematics import forward_kinematics
@@ -31,6 +32,7 @@ from foosim.world.scene import (
     swept_box,
 )
 
+_BY_DISTANCE: Final = attrgetter("entry_m", "name")
 REACH_M: Final = 0.5
 """The scenery near a line is valid while neither end has moved further than this along an axis."""
 UNKNOWN: Vector = (inf, inf, inf)
@@ -96,11 +98,7 @@ class _Groups:
 
 def _in_order(crossings: list[Crossing]) -> list[Crossing]:
     """Return crossings in the order of their distance from the lesser end, then of their names."""
-    return sorted(crossings, key=_by_distance) if len(crossings) > 1 else crossings
-
-
-def _by_distance(crossing: Crossing) -> tuple[float, str]:
-    return crossing.entry_m, crossing.name
+    return sorted(crossings, key=_BY_DISTANCE) if len(crossings) > 1 else crossings
 
 
 class Trace:

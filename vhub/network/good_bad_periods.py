@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from foosim.common.keyed_random import draw_words, unit_interval
-from foosim.deployment.network.impairments import Burst, Outages, ParetoDwell
+from foosim.deployment.network.impairments import Burst, ParetoDwell
 from foosim.vhub.network.series_math import exponential_ns, power
 
 KEPT: Final = 8
@@ -89,13 +89,10 @@ class Times:
         assert burst.mean_bad_ns is not None
         share = burst.loss / burst.bad_loss
         dwell = None if burst.dwell is None else pareto_with_mean(burst.mean_bad_ns, burst.dwell)
-        return self._of(key, int(burst.mean_bad_ns * (1.0 - share) / share), burst.mean_bad_ns, dwell)
+        return self.of(key, int(burst.mean_bad_ns * (1.0 - share) / share), burst.mean_bad_ns, dwell)
 
-    def of_outages(self, key: bytes, outages: Outages) -> Episodes:
-        """Return the times of a link that comes and goes."""
-        return self._of(key, outages.mean_on_ns, outages.mean_off_ns, None)
-
-    def _of(self, key: bytes, good_ns: int, bad_ns: int, dwell: Pareto | None) -> Episodes:
+    def of(self, key: bytes, good_ns: int, bad_ns: int, dwell: Pareto | None = None) -> Episodes:
+        """Return the times with these means, the bad ones of a law of their own where it is given."""
         what = key, good_ns, bad_ns, dwell
         found = self._known.pop(what, None) or Episodes(key, good_ns, bad_ns, dwell)
         self._known[what] = found

@@ -95,7 +95,8 @@ class Corruption(Stage):
         rate = self._error_rate
         odds = rate / (1.0 - rate)
         count = self._least(bits)
-        chance = below = exp(self._ln_mass(count, bits))
+        ln_ways = ln_gamma(bits + 1.0) - ln_gamma(count + 1.0) - ln_gamma(bits - count + 1.0)
+        chance = below = exp(ln_ways + count * ln(rate) + (bits - count) * ln(1.0 - rate))
         while word >= chance_threshold(min(1.0, below)) and count < bits:
             chance *= (bits - count) / (count + 1) * odds
             count += 1
@@ -108,8 +109,3 @@ class Corruption(Stage):
         """Return from which count on the law is looked at: 1, unless no float is as small as what it has there."""
         mean = bits * self._error_rate
         return 1 if mean < MEAN_SMALL else max(1, int(mean - DEVIATIONS * sqrt(mean)))
-
-    def _ln_mass(self, count: int, bits: int) -> float:
-        rate = self._error_rate
-        ln_ways = ln_gamma(bits + 1.0) - ln_gamma(count + 1.0) - ln_gamma(bits - count + 1.0)
-        return ln_ways + count * ln(rate) + (bits - count) * ln(1.0 - rate)

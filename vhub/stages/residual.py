@@ -39,8 +39,9 @@ class Residual(Stage):
         self._setup = setup
         self._burst = chance_threshold(good_loss), chance_threshold(bad_loss)
         self._any = tuple(chance_threshold(state + (1.0 - state) * loss) for state in (good_loss, bad_loss))
-        outages = setup.settings.outages
-        self._outages = None if outages is None else setup.times.of_outages(_time_key(setup, "outages"), outages)
+        self._outages: Episodes | None = None
+        if (outages := setup.settings.outages) is not None:
+            self._outages = setup.times.of(_time_key(setup, "outages"), outages.mean_on_ns, outages.mean_off_ns)
 
     def is_bad(self, flight: Flight) -> bool:
         """Whether the packet meets the link in its bad state."""

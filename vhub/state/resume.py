@@ -78,7 +78,9 @@ def recall(
     start = _start(found, captured, max(limits.KEPT_TICKS, kept_ns // deployment.tick_ns))
     fold = Fold(deployment, records[start:])
     past = Past(fold)
-    _remember(past, *_deliveries_of(fold.state))
+    next_tick = fold.state.closed + 1
+    following = 0 if fold.state.was_final else fold.state.final - next_tick
+    _remember(past, next_tick, encode(Deliveries(next_tick, fold.state.deliveries[next_tick], following)))
     if captured is not None and captured.tick == fold.state.closed:
         known = _frame(fold)
         past.known = None if known is None else Closing(known, known.digest, [], [], chain=fold.chain)
@@ -128,13 +130,6 @@ def _frame(fold: Fold) -> Frame | None:
         return None
     commit = decode(Commit, fold.commit)
     return frame_from_bytes(commit.tick, fold.layout, commit.values, commit.outboxes)
-
-
-def _deliveries_of(state: HubState) -> tuple[int, bytes]:
-    """Return the deliveries after a state, as published where they were published."""
-    tick = state.closed + 1
-    following = 0 if state.was_final else state.final - tick
-    return tick, encode(Deliveries(tick, state.deliveries[tick], following))
 
 
 def _remember(past: Past, tick: int, payload: bytes) -> None:
