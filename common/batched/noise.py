@@ -14,7 +14,6 @@ place has the first, an odd place the second. Captures and digests depend on thi
 
     keys = NoiseKeys([draw_key(seed, "noise", name, "imu") for name in robots])
     turned = rates + 0.01 * keys.normal(tick, width=3, slot=0)           # (robots, 3)
-    is_lost = keys.uniform(tick, width=1, slot=1)[:, 0] < probability
     alone = NoiseKey(draw_key(seed, "noise", "robot-7", "imu")).normal(tick, width=3, slot=0)    # its row, in a list
 
 Neighbours: `foosim.common.keyed_random` has draws of eight words for one packet or event, from BLAKE2b.
@@ -32,12 +31,11 @@ from numpy.typing import NDArray
 from foosim.common.batched.exact_arrays import Floats
 from foosim.common.batched.normal import normal_of_word, normal_of_words
 from foosim.common.batched.philox import Lanes, Words, block, round_keys
-from foosim.common.keyed_random import HALF_WORD, unit_interval
+from foosim.common.keyed_random import unit_interval
 
 AHEAD: Final = 64
 """Draws of one stream that are made at once."""
 _KEY: Final = struct.Struct("<Q")
-_LOWER_BITS: Final = np.array(11, np.uint64)
 
 
 def _philox_key(key: bytes) -> int:
@@ -84,10 +82,6 @@ class NoiseKeys:
         made[:, ::2] = first.reshape(blocks, -1).T
         made[:, 1::2] = second.reshape(blocks, -1).T[:, : width // 2]
         return made
-
-    def uniform(self, counter: int | Words, width: int, slot: int = 0) -> Floats:
-        """Return numbers in [0, 1) of 53 bits, of shape (streams, width)."""
-        return (self.words(counter, width, slot) >> _LOWER_BITS).astype(np.float64) * HALF_WORD
 
     def normal(self, counter: int | Words, width: int, slot: int = 0) -> Floats:
         """Return standard normal numbers, of shape (streams, width)."""

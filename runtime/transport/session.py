@@ -73,9 +73,6 @@ def use_client_runtime() -> None:
     _runtime = CLIENT_RUNTIME
 
 
-Publisher = zenoh.Publisher
-
-
 class _Attempt:
     """One attempt to connect. It has a thread of its own: Zenoh's call can neither be interrupted nor cancelled."""
 
@@ -121,6 +118,20 @@ class _Attempt:
             self._is_abandoned = True
         with contextlib.suppress(queue.Empty):
             _discard(self._outcome.get_nowait())
+
+
+class Publisher:
+    """Puts payloads on one key."""
+
+    def __init__(self, declared: zenoh.Publisher) -> None:
+        self.undeclare = declared.undeclare
+        self._put = declared.put
+        self._pid = os.getpid()
+
+    def put(self, payload: bytes) -> None:
+        """Publish. A stuck reader blocks a blocking publisher for at most half a second; a loss is not reported."""
+        assert os.getpid() == self._pid, "a session does not survive a fork: spawn processes"
+        self._put(payload)
 
 
 class Session(Closable):
@@ -202,8 +213,7 @@ class Session(Closable):
     def publisher(self, key: str, blocking: bool = True) -> Publisher:
         """Return a publisher on one key, without batching, which does not reach subscribers of this session.
 
-        `blocking`: a slow reader holds the sender, for at most half a second; otherwise a message that cannot be sent
-        within 1 ms is lost. No loss is reported.
+        `blocking`: a slow reader holds the sender; otherwise a message that cannot be sent within 1 ms is lost.
         """
         self._check()
         declared = self._session.declare_publisher(
@@ -213,8 +223,9 @@ class Session(Closable):
             reliability=zenoh.Reliability.RELIABLE,
             allowed_destination=zenoh.Locality.REMOTE,
         )
-        self._declared.append(declared)
-        return declared
+        publisher = Publisher(declared)
+        self._declared.append(publisher)
+        return publisher
 
     def subscribe(self, key_expr: str, channel: str, inbox: Inbox) -> None:
         """Offer messages on these keys to the inbox as (channel, last chunk of the key, payload)."""

@@ -32,7 +32,7 @@ def digest_of_numbers() -> str:
     made += [exact_arrays.exp(x), exact_arrays.log(x), *exact_arrays.sincos(x)]
     keys = NoiseKeys(draw_key(2, str(n)) for n in range(101))
     made += [keys.normal(tick, width, slot=tick) for tick, width in enumerate((1, 2, 3, 8, 37))]
-    made += [keys.uniform(1 << 40, 5)]
+    made += [keys.words(1 << 40, 5)]
     return blake2b(b"".join(np.ascontiguousarray(part).tobytes() for part in made), digest_size=16).hexdigest()
 
 
