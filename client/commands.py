@@ -62,7 +62,9 @@ class Taker(NamedTuple):
             values = self._named(command) if isinstance(command, Mapping) else self._ordered(command)
             command = codec.kind(**values)
         if self.joints and _is_several(codec):
-            self._check_length(getattr(command, codec.fields[0].name))
+            numbers = getattr(command, codec.fields[0].name)  # what is no row is refused when it is packed
+            if isinstance(numbers, Sized) and len(numbers) != len(self.joints):
+                raise self._of_another_length(numbers)
         return command
 
     def encode(self, command: Any) -> bytes:
@@ -114,11 +116,6 @@ class Taker(NamedTuple):
         if len(values) != len(fields):
             raise self._of_another_length(values)
         return {field.name: value for field, value in zip(fields, values, strict=True)}
-
-    def _check_length(self, values: object) -> None:
-        """Raise BadValue unless there is a number for each joint; other values are refused when they are packed."""
-        if isinstance(values, Sized) and len(values) != len(self.joints):
-            raise self._of_another_length(values)
 
     def _of_another_length(self, values: Sized) -> BadValue:
         return self.wrong(f"{len(values)} number{'' if len(values) == 1 else 's'} given")

@@ -23,6 +23,7 @@ from foosim.common.keyed_random import draw_key
 from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
 from foosim.common.spec_base import RATE_MIN
 from foosim.common.units import format_ns, format_rate
+from foosim.deployment.components import SECTIONS
 from foosim.deployment.schema import Deployment, Player
 from foosim.deployment.schema_errors import settings_findings
 from foosim.deployment.validate_network import Names, check_network, place_findings, rule_findings
@@ -75,8 +76,6 @@ from foosim.world.moving.upright import stands_upright
 from foosim.world.placing import MountedAt, MountedOrStanding
 from foosim.world.scenery import SceneryMesh
 
-SECTIONS: Final = ("sensors", "actuators", "rules")
-"""The sections of a robot that have components."""
 Said = dict[tuple[str, str], dict[str, list[str]]]
 """By what a player hears, as a text, and a selector: the channels that it subscribes to, each with their endpoints."""
 Find = Callable[[Deployment, Names], Iterable[Finding]]

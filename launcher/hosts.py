@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import gzip
+import os
 import shlex
 import shutil
 import socket
@@ -242,18 +243,10 @@ def _receive(stream: IO[bytes], path: Path, came: dict[Path, Path]) -> str:
 
 def listen(address: Address) -> socket.socket:
     """Return a socket that listens at an address. Raises OSError."""
-    family, kind, number, _, place = socket.getaddrinfo(
-        address.host.strip("[]"), address.port, type=socket.SOCK_STREAM
-    )[0]
-    listener = socket.socket(family, kind, number)
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(place)
-        listener.listen(BACKLOG)  # the system accepts connections; no process does
-    except OSError:
-        listener.close()
-        raise
-    return listener
+    family, _, _, _, place = socket.getaddrinfo(address.host.strip("[]"), address.port, type=socket.SOCK_STREAM)[0]
+    is_dual = family == socket.AF_INET6
+    # The system accepts connections; no process does.
+    return socket.create_server(place, family=family, backlog=BACKLOG, dualstack_ipv6=is_dual)
 
 
 def why_not_free(address: Address) -> tuple[str, str]:
@@ -263,7 +256,8 @@ def why_not_free(address: Address) -> tuple[str, str]:
     except socket.gaierror as error:
         return f"no such host, {error.strerror}", "give a name or address of this machine"
     except OSError as error:
-        return error.strerror or str(error), REMEDIES.get(error.errno or 0, "take another address")
+        why = os.strerror(error.errno) if error.errno else str(error)
+        return why, REMEDIES.get(error.errno or 0, "take another address")
     return "", ""
 
 

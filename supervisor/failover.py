@@ -104,7 +104,8 @@ class Failover:
             if not lacks_inputs(state, standing):
                 state.grant(standing)
             return True
-        if self._is_ahead(standing) and not lacks_inputs(state, standing):
+        is_ahead = bool(standing.commit) and decode(Commit, standing.commit).tick > state.frame.tick
+        if is_ahead and not lacks_inputs(state, standing):
             self._catch_up(standing)
         state.epoch = max(state.epoch, standing.epoch)
         self._standing = standing
@@ -148,10 +149,6 @@ class Failover:
                 self._fail(*why_it_ends(state, self._standing))
         elif is_due:
             self._open(self._standing, here, [name for name in expected if name not in here], now_ns)
-
-    def _is_ahead(self, standing: ResumeState) -> bool:
-        """Whether the vHub has commits beyond the supervisor's journal."""
-        return bool(standing.commit) and decode(Commit, standing.commit).tick > self._state.frame.tick
 
     def _catch_up(self, standing: ResumeState) -> None:
         """Continue from the vHub's last commit. Raises Malformed for one that does not fit its frame."""

@@ -11,7 +11,7 @@ from pydantic import Field, ModelWrapValidatorHandler, PrivateAttr, model_valida
 from foosim.common import units
 from foosim.common.spec_base import Name, SpecBase, default
 from foosim.common.units import Quantity
-from foosim.deployment.network.impairments import LinkSettings
+from foosim.deployment.network.impairments import LinkSettings, Spread
 from foosim.deployment.network.presets import PRESETS, preset_settings
 
 Frequency = Annotated[float, Quantity(units.FREQUENCY, "1 kHz", "100 GHz")]
@@ -24,7 +24,6 @@ Place = Annotated[list[Offset], Field(min_length=3, max_length=3)]
 Coordinate = Annotated[float, Quantity(units.LENGTH, "-100 km", "100 km")]
 Site = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Distance = Annotated[float, Quantity(units.LENGTH, "1 mm", "100 km")]
-Spread = Annotated[int, Quantity(units.TIME, "1 ns", "60 s")]
 
 PresetName = Literal[
     "perfect", "range_only", "acoustic", "wifi_2_4_indoor", "wifi_5_indoor", "dot11p", "lte", "lora_eu868",

@@ -54,9 +54,9 @@ class Settled:
         )
         self.at_sending = [stage for stage in self.stages if type(stage).at_sending is not Stage.at_sending]
         self.at_arrival = [stage for stage in self.stages if type(stage).at_arrival is not Stage.at_arrival]
-        self.slots = 0 if setup is None else slots_of(setup.settings, is_radio=setup.is_radio)
-        shares = setup is None or setup.is_radio or any(isinstance(stage, Queue | CustomModel) for stage in self.stages)
-        self.is_apart = not shares
+        self.slots = 0 if setup is None else slots_of(setup.settings)
+        shares = any(isinstance(stage, Queue | CustomModel) for stage in self.stages)
+        self.is_apart = setup is not None and not setup.settings.is_on_air and not shares
 
 
 class Link:
@@ -138,7 +138,8 @@ class Link:
         if now.version != version or not now.since_ns <= time_ns < now.until_ns:
             settings, since_ns, until_ns = self.settings_at(time_ns)
             setup = self._setup(settings)
-            now = Settled(version, since_ns, until_ns, setup, self._fabric.phase_ns(self.source) * setup.is_radio)
+            phase_ns = self._fabric.phase_ns(self.source) * settings.is_on_air
+            now = Settled(version, since_ns, until_ns, setup, phase_ns)
         self._now = now
         return now
 
@@ -211,12 +212,12 @@ class Link:
         return not flight.cause
 
 
-def slots_of(settings: Radio, *, is_radio: bool) -> int:
+def slots_of(settings: Radio) -> int:
     """Return the draws that settings use: bit n for slot n."""
     bursts = settings.burst, settings.gilbert_elliott, settings.markov4, settings.outages
     used = {
         Slot.LOSS: settings.loss > 0.0 or any(model is not None for model in bursts),
-        Slot.ERROR: is_radio,
+        Slot.ERROR: settings.is_on_air,
         Slot.JITTER: settings.jitter is not None,
         Slot.DUPLICATE: settings.duplicate > 0.0,
         Slot.CORRUPT: settings.corrupt is not None,

@@ -106,7 +106,7 @@ class Air:
         """Return the contention that a station of 802.11 meets when it is ready to send.
 
         Stations with a packet queued or on air then contend; where packets of the station itself wait before this one,
-        stations with about as many waiting by now: all get the same number of turns in the long run.
+        stations with at least three quarters as many by now: all get the same number of turns in the long run.
         """
         place, now_ns, free_ns, waiting = of.place(source), self._advanced_ns, ready_ns, 1
         hears: dict[str, bool] = {}
@@ -134,13 +134,9 @@ class Air:
             elif until_ns > free_ns:
                 free_ns = until_ns
         if waiting > 1:
-            contending |= self._with_as_many(waiting, hears)
+            counts = Counter([known.source for known in self.state.on_air])
+            contending |= {other for other, is_heard in hears.items() if is_heard and 4 * counts[other] >= 3 * waiting}
         return Contest(ready_ns, 1 + len(contending), free_ns, turns, [turn.known.source for turn in turns])
-
-    def _with_as_many(self, waiting: int, hears: Mapping[str, bool]) -> set[str]:
-        """Return the stations in range with at least three quarters as many packets queued or on air."""
-        counts = Counter([known.source for known in self.state.on_air])
-        return {other for other, is_heard in hears.items() if is_heard and 4 * counts[other] >= 3 * waiting}
 
     def take_turn(self, contest: Contest, turn_ns: int, busy_ns: int, slot_ns: int) -> None:
         """Defer the turns after one of this duration."""

@@ -62,14 +62,6 @@ class LinkSetup:
         return draw_words(self.draws.of(flight.channel), flight.draw, flight.copy | block << BLOCK_SHIFT)
 
     @property
-    def is_radio(self) -> bool:
-        return self.settings.is_on_air
-
-    @property
     def shared(self) -> Radio:
         """The settings for broadcasts, which no rule of a single receiver changes."""
         return self.settings if self.own is None else self.own
-
-    @property
-    def sends_once(self) -> bool:
-        return self.settings.sends_once

@@ -37,7 +37,7 @@ class Channel(Stage):
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Channel | None:
-        return cls(setup) if setup.is_radio else None
+        return cls(setup) if setup.settings.is_on_air else None
 
     def at_sending(self, flight: Flight) -> str:
         if flight.outcome or flight.is_settled:

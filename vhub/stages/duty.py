@@ -45,11 +45,11 @@ class Duty(Stage):
         self._settings, self._shared, self._sender = setup.settings, setup.shared, setup.sender
         self._window_ns = setup.settings.duty_window_ns
         self._allowed_ns = allowed_ns(setup.settings.duty_cycle, self._window_ns)
-        self._broadcasts = setup.sends_once
+        self._broadcasts = setup.settings.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Duty | None:
-        return cls(setup) if setup.is_radio and setup.settings.duty_cycle < 1.0 else None
+        return cls(setup) if setup.settings.is_on_air and setup.settings.duty_cycle < 1.0 else None
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender

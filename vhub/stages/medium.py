@@ -129,7 +129,7 @@ class OnAir(Stage):
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
-        self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
+        self._once, self._factor = setup.settings.sends_once, setup.settings.spreading_factor
         self._window_ns = setup.settings.duty_window_ns if setup.settings.duty_cycle < 1.0 else 0
 
     def at_sending(self, flight: Flight) -> str:
@@ -517,6 +517,6 @@ _MEDIA: Final = {"radio": OnAir, "wifi": WiFi, "ieee802154": LrWpan, "lora": LoR
 def make_medium(setup: LinkSetup) -> Wire | OnAir | None:
     """Return the stage of a link's medium; None where sending takes no time."""
     settings = setup.settings
-    if setup.is_radio:
+    if setup.settings.is_on_air:
         return _MEDIA[settings.medium](setup)
     return Wire(setup) if settings.rate_bps is not None or setup.opportunities_ms else None

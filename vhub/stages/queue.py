@@ -43,7 +43,7 @@ class Queue(Stage):
     def __init__(self, setup: LinkSetup) -> None:
         self._sender = setup.sender
         self._own, self._shared = Limits(setup.settings), Limits(setup.shared)
-        self._broadcasts = setup.sends_once
+        self._broadcasts = setup.settings.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Queue | None:
