@@ -374,13 +374,10 @@ def _vector(arguments: dict[str, Any], name: str) -> tuple[float, float, float]:
     if isinstance(value, list) and len(value) == 3 and all(_is_small(number) for number in value):
         x, y, z = value
         return float(x), float(y), float(z)
-    raise Refused(f"{name}: three numbers of at most {NUMBER_MAX:g} are needed, not {_show_list(value)}")
+    shown = f"[{', '.join(show(item) for item in value[:4])}]" if isinstance(value, list) else show(value)
+    raise Refused(f"{name}: three numbers of at most {NUMBER_MAX:g} are needed, not {shown}")
 
 
 def _is_small(number: object) -> bool:
     """Whether this is a number that is finite, also squared."""
     return isinstance(number, int | float) and not isinstance(number, bool) and -NUMBER_MAX <= number <= NUMBER_MAX
-
-
-def _show_list(value: object) -> str:
-    return f"[{', '.join(show(item) for item in value[:4])}]" if isinstance(value, list) else show(value)

@@ -13,7 +13,6 @@ from typing import Final
 from foosim.common import limits
 from foosim.common.errors import Malformed
 from foosim.common.units import parse_pace
-from foosim.deployment.schema import Deployment
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Publish
 from foosim.protocol.asset_transfer import piece_of
@@ -56,7 +55,6 @@ class Clients:
         self._wait_times = waits
         self._report = report
         self._give_up = give_up
-        self._deployment: Deployment | None = None
         self._state: HubState | None = None
         self._releases: Releases | None = None
         self.written: InputsRecord | None = None
@@ -67,14 +65,14 @@ class Clients:
         self.absences = Absences()
         self._looked_ns = 0
 
-    def begin(self, deployment: Deployment, state: HubState, releases: Releases) -> None:
+    def begin(self, state: HubState, releases: Releases) -> None:
         """Take part in a run; before this every message of a client is dropped."""
-        self._deployment, self._state, self._releases = deployment, state, releases
+        self._state, self._releases = state, releases
 
     def resume(self, written: InputsRecord | None, absences: AbsencesRecord, now_ns: int) -> None:
         """Wait for the clients of the vHub process before this one; `written` is its record of joins and leaves at
         the next tick, `absences` its record of absent players."""
-        assert self._state is not None and self._deployment is not None
+        assert self._state is not None
         self.written = written
         members, came = self._state.members, set()
         here = {name for name, member in members.items() if member.active}
@@ -117,7 +115,7 @@ class Clients:
 
     def go(self, name: str, tick: int, flights: list[Flight], now_ns: int) -> None:
         """Send a lockstep client the Go of a tick, and begin to wait for its Done."""
-        assert self._state is not None and self._deployment is not None and self._releases is not None
+        assert self._state is not None and self._releases is not None
         member = self._state.members[name]
         member.downlink += 1
         session = self._sessions.by_name.get(name)
@@ -128,14 +126,14 @@ class Clients:
         go = Go(member.downlink, tick, member.sequence, received(flights), member.since, [*member.absent])
         self._sessions.send_go(session, go)
         session.deadline = "lockstep_realtime" if self._releases.factor else "lockstep_fast"
-        allowed_ns: int = getattr(self._deployment.deadlines, f"{session.deadline}_ns")
-        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * self._deployment.tick_ns))
+        allowed_ns: int = getattr(self._state.deployment.deadlines, f"{session.deadline}_ns")
+        session.wait(now_ns, allowed_ns, max(limits.WANT_AFTER_NS, 2 * self._state.deployment.tick_ns))
 
     # --- messages ----------------------------------------------------------------------------------------------------
 
     def on_hello(self, hello: ClientHello, build: Build) -> None:
         """Admit a client, or refuse it with the reason."""
-        if self._state is None or self._deployment is None:
+        if self._state is None:
             return
         session, known = self._sessions.by_name.get(hello.name), self._state.members.get(hello.name)
         if session is not None and session.is_late(hello):
@@ -143,7 +141,7 @@ class Clients:
             return
         if session is not None and not session.boot and not hello.returns and known is not None and known.active:
             self._miss(hello.name, "", LOST_MEANWHILE)
-        self._sessions.hello(hello, build, self._deployment, self._state, self._last_sent(hello.name))
+        self._sessions.hello(hello, build, self._state.deployment, self._state, self._last_sent(hello.name))
 
     def on_join(self, join: Join, now_ns: int) -> bool:
         """Note a client's join, which takes effect at a tick that suits it; a member is sent what it has missed.
@@ -173,11 +171,11 @@ class Clients:
     def on_fetch(self, fetch: Fetch, payload: bytes, now_ns: int) -> None:
         """Send a client a piece of a file of the world, within what it may fetch. Raises Malformed for no such file."""
         session = self._sessions.by_name.get(fetch.name)
-        if session is None or fetch.boot not in session.claims or self._deployment is None:
+        if session is None or fetch.boot not in session.claims or self._state is None:
             self.repeated += 1
             return
         if session.may_fetch(now_ns):
-            piece = piece_of(self._deployment, fetch, limits.RADIO_PIECE_BYTES)
+            piece = piece_of(self._state.deployment, fetch, limits.RADIO_PIECE_BYTES)
             self._actions.append(Publish(channels.CLIENT_PIECE, fetch.name, encode(piece)))
 
     def on_up(self, up: Up, payload: bytes, now_ns: int) -> None:
@@ -223,10 +221,10 @@ class Clients:
     def on_failure(self, failure: Failure, payload: bytes, now_ns: int) -> None:
         """End the run for a player that reports its own failure: the run cannot continue without it."""
         session = self._sessions.by_name.get(failure.name)
-        if session is None or self._deployment is None or not session.may_fail(failure.boot):
+        if session is None or self._state is None or not session.may_fail(failure.boot):
             self.repeated += 1
             return
-        if failure.name not in self._deployment.players:
+        if failure.name not in self._state.deployment.players:
             raise Malformed(f"{failure.name} reports a failure; only players may")
         self._give_up(failure.reason)
 
@@ -289,7 +287,7 @@ class Clients:
 
     def _miss(self, name: str, boot: str, reason: str) -> None:
         """Record that a player's process is away from a run that has begun."""
-        if self._deployment is not None and may_restart(self._deployment, name) and self.has_begun:
+        if self._state is not None and may_restart(self._state.deployment, name) and self.has_begun:
             self.absences.begin(name, boot, reason, self._tick)
             self.report()
 
@@ -302,19 +300,21 @@ class Clients:
 
     def _back_ns(self, name: str) -> int:
         """Return for how long the run waits for a client that is away."""
-        assert self._deployment is not None
-        is_started_again = may_restart(self._deployment, name) and not self._may_continue_without(name)
-        return self._start_ns if is_started_again or not self.has_begun else self._deployment.deadlines.client_back_ns
+        assert self._state is not None
+        is_started_again = may_restart(self._state.deployment, name) and not self._may_continue_without(name)
+        if is_started_again or not self.has_begun:
+            return self._start_ns
+        return self._state.deployment.deadlines.client_back_ns
 
     def _may_continue_without(self, name: str) -> bool:
         """Whether the run continues while a client is restarted: in realtime, once it has begun."""
-        assert self._deployment is not None
+        assert self._state is not None
         is_realtime = self._releases is not None and self._releases.factor > 0
-        return may_restart(self._deployment, name) and is_realtime and self.has_begun
+        return may_restart(self._state.deployment, name) and is_realtime and self.has_begun
 
     def _turn_to_pace(self, now_ns: int) -> None:
         """The pace has turned to or from realtime: give players that are away the deadline of the new pace."""
-        deployment = self._deployment
+        deployment = None if self._state is None else self._state.deployment
         for name, session in self._sessions.by_name.items():
             if session.away_ns >= 0 and deployment is not None and may_restart(deployment, name):
                 session.leave(self._back_ns(name), now_ns)
@@ -361,8 +361,8 @@ class Clients:
 
     def _why_lost(self, session: Session) -> str:
         """Return why the run does not wait any longer for a client that is away."""
-        deployment = self._deployment
-        assert deployment is not None
+        assert self._state is not None
+        deployment = self._state.deployment
         if may_restart(deployment, session.name):
             return f"it was not started again within {deployment.deadlines.start_ns / 1e9:g} s (deadlines.start)"
         return session.why_gone if session.boot else "it did not come back to the vHub"
@@ -400,8 +400,8 @@ class Clients:
     @property
     def _start_ns(self) -> int:
         """How long a client has to come whose process is being started."""
-        assert self._deployment is not None
-        deadlines = self._deployment.deadlines
+        assert self._state is not None
+        deadlines = self._state.deployment.deadlines
         return max(deadlines.client_back_ns, deadlines.start_ns)
 
     def _leave(self, name: str) -> None:

@@ -506,7 +506,7 @@ class HubCore:
         self.member.standing = self._resume_state
         if past is None:
             self.state = HubState(deployment, self.member.first_tick)
-            self.clients.begin(deployment, self.state, self.releases)
+            self.clients.begin(self.state, self.releases)
             self.commits.start(self.member.layout, self.member.first_tick, first_chain(build.origin))
         else:
             self._resume(past, now_ns)
@@ -518,7 +518,7 @@ class HubCore:
         assert self.deployment is not None and self.releases is not None
         fold = past.fold
         state = self.state = fold.state
-        self.clients.begin(self.deployment, state, self.releases)
+        self.clients.begin(state, self.releases)
         self.commits.start(fold.layout, state.closed + 1, fold.chain, past.committed)
         self._sent = past.sent
         self.sessions.downlinks.restore(past.downlinks, now_ns)

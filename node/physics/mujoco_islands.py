@@ -278,8 +278,10 @@ class CompositionEngine:
             qpos[q : q + 7] = *start[at : at + 3], w, x, y, z
             qvel[v : v + 6] = *linear, *rotate((-x, -y, -z, w), spin)
         for placed, body in seats.fixed:
-            if placed.fixed_at is not body:
-                self._place_base(placed, body)
+            if placed.fixed_at is not body:  # the base of another body of its kind
+                x, y, z, w = body.orientation
+                placed.fixed_at = body
+                self.m.body_pos[placed.base], self.m.body_quat[placed.base] = body.position, (w, x, y, z)
         for (number, origin, axes), grasp in zip(self._welds, seats.grasps, strict=True):
             self._weld(number, origin, axes, numbers[grasp : grasp + 7])
         if self._motors:
@@ -288,12 +290,6 @@ class CompositionEngine:
         self._qpos[:], self._qvel[:] = qpos, qvel
         self._warm.fill(0.0)
         self.d.time = 0.0
-
-    def _place_base(self, placed: Placed, body: Body) -> None:
-        """Put the fixed base of a body of the same kind to the place of this one's."""
-        x, y, z, w = body.orientation
-        placed.fixed_at = body
-        self.m.body_pos[placed.base], self.m.body_quat[placed.base] = body.position, (w, x, y, z)
 
     def _weld(self, number: int, origin: Vector, axes: Quaternion, grasp: Sequence[float]) -> None:
         """Set how a body is held by a link whose frame has the pose (`origin`, `axes`) in MuJoCo's body."""

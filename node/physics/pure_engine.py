@@ -108,7 +108,10 @@ class PureEngine:
                 for shaft, shapes in near:
                     self._strike(sphere, shaft, shapes, pushes, substep)
                 for other in spheres[index + 1 :]:
-                    self._clash(sphere, other, substep)
+                    impulse = meet_sphere(sphere, other, self._between_free, dt)
+                    if impulse > 0.0:
+                        sphere.log.add(impulse, substep)
+                        other.log.add(impulse, substep)
                 self._land(sphere, pushes, substep)
                 if pushes:
                     self._yield(sphere, near)
@@ -136,12 +139,6 @@ class PureEngine:
             contact = shapes.contact(sphere, shaft)
             if contact:
                 yield_shaft(sphere, shaft, contact[1], contact[0])
-
-    def _clash(self, sphere: FreeSphere, other: FreeSphere, substep: int) -> None:
-        impulse = meet_sphere(sphere, other, self._between_free, self._dt)
-        if impulse > 0.0:
-            sphere.log.add(impulse, substep)
-            other.log.add(impulse, substep)
 
     def _land(self, sphere: FreeSphere, pushes: Sequence[Vector], substep: int) -> None:
         """Move a sphere out of the scenery, the deepest contact first: the next is found after that.

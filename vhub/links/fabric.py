@@ -119,7 +119,7 @@ class Link:
             profile.rule != NO_RADIO,
             air,
             budget,
-            tuple(timeline.cuts_of(*ends)),
+            tuple(sorted((cut.start_ns, cut.end_ns) for cut in timeline.cuts if cut.parts(*ends))),
             tuple(timeline.holds_of(*ends)),
             fabric.network.defaults.in_flight_on_partition == "drop",
             jitter_ns(settings.jitter, fabric.deployment.asset_files),

@@ -130,10 +130,6 @@ class Timeline:
 
     # --- queries of links --------------------------------------------------------------------------------------------
 
-    def cuts_of(self, source: str, destination: str) -> list[tuple[int, int]]:
-        """Return the times in which the link is cut, by start."""
-        return sorted((cut.start_ns, cut.end_ns) for cut in self.cuts if cut.parts(source, destination))
-
     def cut_at(self, source: str, destination: str, at_ns: int) -> Cut | None:
         """Return what cuts a link at a time, the first to begin; None where nothing does."""
         found = [cut for cut in self.cuts if cut.start_ns <= at_ns < cut.end_ns and cut.parts(source, destination)]

@@ -211,8 +211,7 @@ def saturation_rate_hz(contenders: int, airtime_ns: int, ack_ns: int, timing: Wi
     `ack_ns` 0: broadcasts.
     """
     unicast = ack_ns > 0
-    doublings = _doublings(timing.cw_min, timing.cw_max) if unicast else 0
-    tau = contention(contenders, timing.cw_min + 1, doublings).tau
+    tau = wifi_contention(contenders, timing, unicast=unicast).tau
     n = min(max(contenders, 1), CONTENDERS_MAX)
     exchange_ns = timing.difs_ns + airtime_ns + (timing.sifs_ns + ack_ns if unicast else 0)
     idle = _power(1.0 - tau, n)

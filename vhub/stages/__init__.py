@@ -38,7 +38,7 @@ STAGES: Final[tuple[tuple[str, Callable[[LinkSetup], Stage | None], tuple[str, .
     ("custom_model", CustomModel.for_link, (MODEL, MODEL_FAILED)),
     ("corruption", Corruption.for_link, (CRC_FAIL,)),
     ("delay", Delay.for_link, ()),
-    ("receiver", Receiver.for_link, (RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL)),
+    ("receiver", lambda _: Receiver(), (RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL)),
 )
 """Each with its name and the causes of its drops.
 

@@ -338,15 +338,12 @@ Curve = Callable[[Flight, int], int]
 def error_curve(settings: Radio) -> Curve | None:
     """Return the curve of a radio's errors; None on media without errors."""
     mtu = settings.payload_max
-    if settings.medium == "wifi":
-        modes = {errors.MODES[mode].rate_bps: mode for mode in wifi_modes(settings)}
+    if settings.medium in ("wifi", "ieee802154"):
+        is_wifi = settings.medium == "wifi"
+        overhead = WIFI_OVERHEAD_BYTES if is_wifi else LRWPAN_OVERHEAD_BYTES
+        modes = {errors.MODES[mode].rate_bps: mode for mode in (wifi_modes(settings) if is_wifi else (LRWPAN_MODE,))}
         return lambda flight, snr_cdb: any_threshold(
-            lambda size: errors.per_threshold(modes[flight.rate_bps], snr_cdb, size + WIFI_OVERHEAD_BYTES),
-            frames_of(flight.size, mtu),
-        )
-    if settings.medium == "ieee802154":
-        return lambda flight, snr_cdb: any_threshold(
-            lambda size: errors.per_threshold(LRWPAN_MODE, snr_cdb, size + LRWPAN_OVERHEAD_BYTES),
+            lambda size: errors.per_threshold(modes[flight.rate_bps], snr_cdb, size + overhead),
             frames_of(flight.size, mtu),
         )
     if settings.medium == "lte":

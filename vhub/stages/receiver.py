@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 from foosim.capture.rows import ClientRow
-from foosim.vhub.network.link_context import LinkSetup
 from foosim.vhub.network.packet import Flight, size_of_payload
 from foosim.vhub.stages.explanation import Explanation, Seen
 from foosim.vhub.stages.stage import Stage
@@ -19,10 +18,6 @@ TRANSIT_FULL: Final = "transit_full"
 
 class Receiver(Stage):
     """Drops packets for the reasons that the state finds at arrival: body out of service, client left, message full."""
-
-    @classmethod
-    def for_link(cls, setup: LinkSetup) -> Receiver:
-        return cls()
 
     def at_arrival(self, flight: Flight, hindered: str) -> str:
         return hindered
