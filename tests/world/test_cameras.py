@@ -64,7 +64,7 @@ def everything(deployment: Deployment, numbers: list[float], sight: Sight) -> Si
     layout = build_layout(deployment)
     scene = Surroundings(deployment, layout).scene
     links: list[float] = []
-    for number, (name, index) in enumerate(moving_links(scene)):
+    for number, (name, index) in enumerate(moving_links(scene.bodies)):
         if not layout[name].is_absent(numbers):
             _, position, orientation = forward_kinematics(scene.bodies[name], layout[name], numbers)[index]
             links += [float(number), *position, *orientation]
@@ -183,6 +183,13 @@ def test_settings_that_cannot_be_are_refused(settings: str) -> None:
     with pytest.raises(DeploymentError) as error:
         with_eye(settings)
     assert REFUSED[settings] in str(error.value).replace("robots.camera.sensors.", "")
+
+
+@pytest.mark.parametrize(
+    "kind", ["rgbd", "semantic_camera, tag: b", "laser_scanner_3d, rows: 1, columns: 2, range: 1 m"]
+)
+def test_settings_are_checked_before_the_files_of_the_scenery_are_read(kind: str) -> None:
+    with_eye(f"kind: {kind}", "scenery={wedge: {shape: mesh, file: wedge.obj}}")
 
 
 def test_more_moving_links_than_a_packet_takes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

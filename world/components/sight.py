@@ -6,6 +6,7 @@ those of the moving links in view, as float64, so that a picture drawn from a pa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -19,7 +20,7 @@ from foosim.world.components.optics import moving_links
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting
 from foosim.world.layout import Layout
-from foosim.world.scene import Link, Scene, Vector, enclosing, moved, shape_box
+from foosim.world.scene import Body, Link, Vector, enclosing, moved, shape_box
 
 if TYPE_CHECKING:  # a client without pictures does without numpy
     import numpy as np
@@ -98,16 +99,16 @@ class Sight(Seen, frozen=True, dict=True):
 
 def looks_of(at: Mounting) -> list[Looks]:
     """Return the bodies with moving links that look like something, which all cameras of a layout share."""
-    scene = Surroundings(at.spec, at.layout).scene
-    found = at.layout.shared("looks", at.spec, lambda: _looks(scene, at.layout))
+    bodies = Surroundings(at.spec, at.layout).bodies
+    found = at.layout.shared("looks", at.spec, lambda: _looks(bodies, at.layout))
     assert isinstance(found, list)
     return found
 
 
-def _looks(scene: Scene, layout: Layout) -> list[Looks]:
+def _looks(bodies: Mapping[str, Body], layout: Layout) -> list[Looks]:
     found: dict[str, Looks] = {}
-    for number, (name, index) in enumerate(moving_links(scene)):
-        body = scene.bodies[name]
+    for number, (name, index) in enumerate(moving_links(bodies)):
+        body = bodies[name]
         if sphere := sphere_of(body.links[index]):
             its = found.setdefault(name, Looks(body, layout[name]))
             its.numbers[index], (its.middles[index], its.radii[index]) = number, sphere
