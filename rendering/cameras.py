@@ -112,8 +112,8 @@ class Overview:
 
     def at(self, tick: int, numbers: Sequence[float]) -> Sight:
         """Return the reading at a frame."""
-        links = self._in_view.links(list(numbers), self._eye, self._turned)
-        sight = Sight(float(tick), *self._eye, *self._turned, tuple(links))
+        bodies = self._in_view.moving(list(numbers), self._eye, self._turned)
+        sight = Sight(float(tick), *self._eye, *self._turned, tuple(bodies))
         sight.kept["drawn_by"] = self.pictures
         return sight
 

@@ -82,7 +82,7 @@ class SemanticCamera(Sensor):
                 continue
             poses = self._around.poses(view, entity)
             arms = [moved(moved(poses[n][1], rotate(poses[n][2], point), 1.0), place, -1.0) for n, point in points]
-            inside = [arm for arm in arms if self._in_view.touches(its := rotate(back, arm), 0.0) and its[0] >= near]
+            inside = [arm for arm in arms if self._in_view.away(its := rotate(back, arm)) <= 0.0 and its[0] >= near]
             if inside:
                 where = rotate(back, moved(poses[0][1], place, -1.0))
                 ways += inside
