@@ -84,9 +84,7 @@ class Surroundings:
     @property
     def caster(self) -> Caster:
         """The ray caster of the layout, which all components of it share."""
-        found = self._layout.shared("caster", self._spec, self._made_caster)
-        assert isinstance(found, Caster)
-        return found
+        return self._layout.shared("caster", self._spec, self._made_caster)
 
     def _made_caster(self) -> Caster:
         return Caster(self.scene, self._layout)
@@ -94,25 +92,21 @@ class Surroundings:
     @property
     def scene(self) -> Scene:
         """The bodies of the layout and the scenery, which all components of it share."""
-        found = self._layout.shared("scene", self._spec, self._made_scene)
-        assert isinstance(found, Scene)
-        return found
+        return self._layout.shared("scene", self._spec, self._made_scene)
 
     @cached_property
     def bodies(self) -> dict[str, Body]:
         """The bodies of the layout by name, which all components of it share; they need no file of the scenery."""
-        found = self._layout.shared("bodies", self._spec, self._made_bodies)
-        assert isinstance(found, dict)
-        return found
+        return self._layout.shared("bodies", self._spec, self._made_bodies)
 
     def _made_bodies(self) -> dict[str, Body]:
-        found: dict[str, Body] = {}
-        for entity in self._layout.entities:
-            if entity.name != WORLD:
-                at = mounting_of(self._spec, self._layout, entity)
-                body = entity.kind.factory(self._spec.settings_of(entity.name), at).body()
-                found |= {} if body is None else {entity.name: body}
-        return found
+        spec, layout = self._spec, self._layout
+        models = {
+            one.name: one.kind.factory(spec.settings_of(one.name), mounting_of(spec, layout, one))
+            for one in layout.entities
+            if one.name != WORLD
+        }
+        return {name: body for name, model in models.items() if (body := model.body()) is not None}
 
     def _made_scene(self) -> Scene:
         return Scene(self.bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
