@@ -78,4 +78,4 @@ def _built(spec: WorldSpec, what: str) -> DrawnWorld:
         scene = build_scene(spec, layout)
     except (AssetError, Malformed) as error:
         raise AssetError(f"{what} cannot be drawn here without the files of the world: {error}") from error
-    return DrawnWorld(scene, layout, moving_bodies(scene, layout))
+    return DrawnWorld(scene, layout, moving_bodies(scene.bodies, layout))

@@ -27,7 +27,7 @@ class _Casting:
 
     def __init__(self, world: DrawnWorld) -> None:
         scene, layout = world.scene, world.layout
-        numbers = {link: number for number, link in enumerate(moving_links(scene))}
+        numbers = {link: number for number, link in enumerate(moving_links(scene.bodies))}
         still: list[Part] = [(shape, NOTHING, 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
         moving: list[Part] = []
         for name, body in sorted(scene.bodies.items()):

@@ -59,7 +59,7 @@ def test_a_scan_is_that_of_rays_in_the_frame() -> None:
                 at = entity.offsets.get(field, 0)
                 count = entity.counts.get(field, 0) if not entity.is_absent(numbers) else 0
                 numbers[at : at + count] = (np.array(numbers[at : at + count]) + rng.normal(0.0, sigma, count)).tolist()
-        for looks in moving_bodies(around.scene, layout):
+        for looks in moving_bodies(around.bodies, layout):
             poses = forward_kinematics(looks.body, looks.entity, numbers)
             at, reach = looks.free_at, looks.radius + sum(abs(numbers[place]) for place in looks.slides)
             place = looks.place if at < 0 else numbers[at : at + 3]

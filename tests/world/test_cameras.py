@@ -61,7 +61,7 @@ def everything(deployment: Deployment, numbers: list[float], sight: Sight) -> Si
     """Return a reading with all moving bodies that are present instead of those in view."""
     layout = build_layout(deployment)
     bodies: list[float] = []
-    for number, looks in enumerate(moving_bodies(Surroundings(deployment, layout).scene, layout)):
+    for number, looks in enumerate(moving_bodies(Surroundings(deployment, layout).bodies, layout)):
         if not looks.entity.is_absent(numbers):
             bodies += [float(number), *(one for first, end in looks.pose for one in numbers[first:end])]
     assert len(sight.bodies) < len(bodies)
@@ -194,6 +194,13 @@ def test_settings_that_cannot_be_are_refused(settings: str) -> None:
     with pytest.raises(DeploymentError) as error:
         with_eye(settings)
     assert REFUSED[settings] in str(error.value).replace("robots.camera.sensors.", "")
+
+
+@pytest.mark.parametrize(
+    "kind", ["rgbd", "semantic_camera, tag: b", "laser_scanner_3d, rows: 1, columns: 2, range: 1 m"]
+)
+def test_settings_are_checked_before_the_files_of_the_scenery_are_read(kind: str) -> None:
+    with_eye(f"kind: {kind}", "scenery={wedge: {shape: mesh, file: wedge.obj}}")
 
 
 def test_more_moving_bodies_than_a_packet_takes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

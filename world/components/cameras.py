@@ -187,15 +187,15 @@ class Eye:
         around = Surroundings(at.spec, at.layout)
         self._mount: Mounted | None = None
         self._standing = where.position, where.orientation
-        if at.robot.name in around.scene.bodies:
+        if at.robot.name in around.bodies:
             self._mount = Mounted(at, where)
         elif where.link is not None:
             what = f"{at.robot.name} has no body, so its cameras are placed in the world's frame, without a link"
             raise IncompatibleComponent(("at", "link"), what, where.link)
         self._target, self._seen = settings.look_at, None
         if settings.look_at is not None and (name := settings.look_at.entity) is not None:
-            if name not in around.scene.bodies:
-                there = [*around.scene.bodies]
+            if name not in around.bodies:
+                there = [*around.bodies]
                 nearest = nearest_quoted(name, there)
                 raise IncompatibleComponent(("look_at", "entity"), "no entity with a body", name, nearest)
             self._seen = Mounted(mounting_of(at.spec, at.layout, at.layout[name]), FIRST_LINK)

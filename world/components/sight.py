@@ -6,6 +6,7 @@ numbers of the moving bodies in view, as float64, so that a picture drawn from a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -20,7 +21,7 @@ from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout
-from foosim.world.scene import ORIGIN, Body, Link, Scene, Vector, dot, enclosing, moved, shape_box
+from foosim.world.scene import ORIGIN, Body, Link, Vector, dot, enclosing, moved, shape_box
 
 if TYPE_CHECKING:  # a client without pictures does without numpy
     import numpy as np
@@ -95,19 +96,19 @@ class Sight(Seen, frozen=True, dict=True):
 
 def looks_of(at: Mounting) -> list[Looks]:
     """Return the moving bodies of a layout, which all its cameras share."""
-    scene = Surroundings(at.spec, at.layout).scene
-    found = at.layout.shared("looks", at.spec, lambda: moving_bodies(scene, at.layout))
+    bodies = Surroundings(at.spec, at.layout).bodies
+    found = at.layout.shared("looks", at.spec, lambda: moving_bodies(bodies, at.layout))
     assert isinstance(found, list)
     return found
 
 
-def moving_bodies(scene: Scene, layout: Layout) -> list[Looks]:
+def moving_bodies(bodies: Mapping[str, Body], layout: Layout) -> list[Looks]:
     """Return the bodies with moving links that look like something, in name order."""
     links: dict[str, list[tuple[int, int]]] = {}
-    for number, (name, index) in enumerate(moving_links(scene)):
-        if sphere_of(scene.bodies[name].links[index]):
+    for number, (name, index) in enumerate(moving_links(bodies)):
+        if sphere_of(bodies[name].links[index]):
             links.setdefault(name, []).append((index, number))
-    return [_looks(scene.bodies[name], layout[name], its) for name, its in links.items()]
+    return [_looks(bodies[name], layout[name], its) for name, its in links.items()]
 
 
 def _looks(body: Body, entity: Entity, links: list[tuple[int, int]]) -> Looks:
