@@ -21,7 +21,7 @@ from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, Unknown
 from foosim.common.finding import Finding, Location
 from foosim.common.keyed_random import draw_key
 from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
-from foosim.common.spec_base import RATE_MIN
+from foosim.common.spec_base import RATE_MIN, SpecBase
 from foosim.common.units import format_ns, format_rate
 from foosim.deployment.schema import Deployment, Player
 from foosim.deployment.schema_errors import settings_findings
@@ -842,6 +842,31 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
             yield Finding(place, error.problem, error.value, error.nearest)
 
 
+def _tags(deployment: Deployment, ends: Names) -> Iterator[Finding]:
+    """Yield the settings `tag` of components and rules that name a tag of no entity; what robots share counts once."""
+    entities = [*deployment.robots.values(), *deployment.objects.values()]
+    known = {tag for model in _models(deployment) for tag in model.tags} | {tag for one in entities for tag in one.tags}
+    parts = {id(settings): (("rules", name), settings) for name, settings in deployment.rules.items()}
+    for name, robot in deployment.robots.items():
+        for of, label, settings in _components_of(robot):
+            parts.setdefault(id(settings), (("robots", name, of, label), settings))
+    for place, settings in parts.values():
+        for location, tag in _values_of("tag", settings, place):
+            if tag not in known:
+                error = UnknownName("a tag that no entity has", tag, sorted(known))
+                yield Finding(location, error.problem, tag, error.nearest)
+
+
+def _values_of(name: str, settings: SpecBase, place: Location) -> Iterator[tuple[Location, str]]:
+    """Yield the texts of a setting's name, also in lists of settings, with their locations."""
+    for key, value in settings:
+        if key == name and isinstance(value, str):
+            yield (*place, key), value
+        for index, one in enumerate(value if isinstance(value, list) else ()):
+            if isinstance(one, SpecBase):
+                yield from _values_of(name, one, (*place, key, index))
+
+
 def _selects(settings: ComponentSettings) -> bool:
     """Whether a component has a setting that selects joints of its robot."""
     return bool(getattr(settings.component_type, "joints", ""))
@@ -980,6 +1005,7 @@ STATE: Final = (
 )
 """Of the state of a world, whose robots' files must be there."""
 WHOLE: Final = (
+    Check("tags of components", _tags),
     Check("surfaces and gravity", lambda deployment, ends: findings_of(deployment)),
     Check("engine", _engine),
     Check("settings of rules over radios", lambda d, ends: rule_findings(d.profiles(), ends.names)),

@@ -505,7 +505,7 @@ def _phases(deployment: Deployment, late_ns: Callable[[Radio], int]) -> Iterator
             every = turn // step
             sampled = -(shift // step) % every
             profile = profiles.find(source, name, channel)
-            delay = -(-late_ns(profile.settings) // tick_ns)
+            delay = -(-(late_ns(profile.settings) + robot.sensors[channel].late_by_ns) // tick_ns)
             common = gcd(period, every)
             waits = (own - delay - sampled) % common
             mean = delay + waits + (every - common) / 2
