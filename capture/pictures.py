@@ -227,8 +227,8 @@ def _overview(capture: CaptureData, out: Path, span_ns: tuple[int, int | None]) 
     frames = (
         view.at(frame.tick, frame.numbers).image() for frame in capture.each_frame() if first <= frame.tick <= last
     )
-    frames = _some(frames, capture, span_ns)
-    return _video(out, frames, *OVERVIEW_PIXELS, 1e9 / (deployment.capture.frames_every * deployment.tick_ns))
+    rate_hz = 1e9 / (deployment.capture.frames_every * deployment.tick_ns)
+    return _video(out, _some(frames, capture, span_ns), *OVERVIEW_PIXELS, rate_hz)
 
 
 def _video(out: Path, frames: Iterable[NDArray[np.uint8]], width: int, height: int, rate_hz: float) -> int:

@@ -525,6 +525,8 @@ def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     once.
     """
     kits = deployment.kits
+    tagged: list[Any] = [*deployment.robots.values(), *deployment.objects.values(), *_models(deployment)]
+    tags = {tag for entity in tagged for tag in entity.tags}
     met: set[tuple[int, int]] = set()
     for section, entities in (("robots", deployment.robots), ("objects", deployment.objects)):
         for name, entity in entities.items():
@@ -546,12 +548,24 @@ def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                     found = settings.component_type
                     for what in [*_needs_kit(found, kits)] or _component_problems(found, model, having):
                         yield Finding((*place, of, label, "kind"), what, settings.kind)
+                    yield from _unknown_tags(settings, (*place, of, label), tags)
     for label, rule in deployment.rules.items():
         for what in (*_needs_kit(rule.component_type, kits), *_rule_problems(rule.component_type)):
             yield Finding(("rules", label, "kind"), what, rule.kind)
+        yield from _unknown_tags(rule, ("rules", label), tags)
     if deployment.scene is not None:
         for what in _needs_kit(deployment.scene.component_type, kits):
             yield Finding(("scene", "kind"), what, deployment.scene.kind)
+
+
+def _unknown_tags(settings: SpecBase | list[Any], place: Location, tags: Collection[str]) -> Iterator[Finding]:
+    """Yield the settings `tag` of a component or rule, also in lists of it, with a tag of no entity."""
+    for key, value in settings if isinstance(settings, SpecBase) else enumerate(settings):
+        if isinstance(value, SpecBase | list):
+            yield from _unknown_tags(value, (*place, key), tags)
+        elif key == "tag" and value is not None and value not in tags:
+            error = UnknownName("a tag that no entity has", value, sorted(tags))
+            yield Finding((*place, key), error.problem, value, error.nearest)
 
 
 def _components_of(entity: EntitySettings) -> Iterator[tuple[str, str, ComponentSettings]]:
@@ -842,31 +856,6 @@ def _unfit_components(spec: Deployment, ends: Names) -> Iterator[Finding]:
             yield Finding(place, error.problem, error.value, error.nearest)
 
 
-def _tags(deployment: Deployment, ends: Names) -> Iterator[Finding]:
-    """Yield the settings `tag` of components and rules that name a tag of no entity; what robots share counts once."""
-    entities = [*deployment.robots.values(), *deployment.objects.values()]
-    known = {tag for model in _models(deployment) for tag in model.tags} | {tag for one in entities for tag in one.tags}
-    parts = {id(settings): (("rules", name), settings) for name, settings in deployment.rules.items()}
-    for name, robot in deployment.robots.items():
-        for of, label, settings in _components_of(robot):
-            parts.setdefault(id(settings), (("robots", name, of, label), settings))
-    for place, settings in parts.values():
-        for location, tag in _values_of("tag", settings, place):
-            if tag not in known:
-                error = UnknownName("a tag that no entity has", tag, sorted(known))
-                yield Finding(location, error.problem, tag, error.nearest)
-
-
-def _values_of(name: str, settings: SpecBase, place: Location) -> Iterator[tuple[Location, str]]:
-    """Yield the texts of a setting's name, also in lists of settings, with their locations."""
-    for key, value in settings:
-        if key == name and isinstance(value, str):
-            yield (*place, key), value
-        for index, one in enumerate(value if isinstance(value, list) else ()):
-            if isinstance(one, SpecBase):
-                yield from _values_of(name, one, (*place, key, index))
-
-
 def _selects(settings: ComponentSettings) -> bool:
     """Whether a component has a setting that selects joints of its robot."""
     return bool(getattr(settings.component_type, "joints", ""))
@@ -1005,7 +994,6 @@ STATE: Final = (
 )
 """Of the state of a world, whose robots' files must be there."""
 WHOLE: Final = (
-    Check("tags of components", _tags),
     Check("surfaces and gravity", lambda deployment, ends: findings_of(deployment)),
     Check("engine", _engine),
     Check("settings of rules over radios", lambda d, ends: rule_findings(d.profiles(), ends.names)),
