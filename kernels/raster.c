@@ -90,10 +90,11 @@ static int clip(Corner *polygon, double near) {
 
 static void draw(const Band *band, double height, double near, const Corner *all, const int32_t *corners, int both,
                  int32_t number) {
-    Corner p[CLIPPED] = {all[corners[0]], all[corners[1]], all[corners[2]]};
+    Corner p[CLIPPED];
     double width = (double)band->width;
     int is_plain = 1, count = 3, low = 15, right = 1, below = 1;
     for (int i = 0; i < 3; i++) {
+        p[i] = all[corners[i]];
         double guard = GUARD * p[i].w;
         is_plain &= p[i].w >= near && p[i].x >= -guard && p[i].x <= guard && p[i].y >= -guard && p[i].y <= guard;
         low &= (p[i].w < near) | (p[i].x < 0.0) << 1 | (p[i].y < 0.0) << 2;
