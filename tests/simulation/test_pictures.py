@@ -12,9 +12,11 @@ from gymnasium import spaces
 from foosim.capture.reader import open_capture
 from foosim.common.errors import UnknownName
 from foosim.deployment.channel_kinds import channel_codec
+from foosim.rendering.cameras import Overview
 from foosim.simulation.env import FoosimEnv
 from foosim.simulation.run import rehearse
-from tests.deployed import TABLE, TEXT
+from foosim.simulation.simulation import Simulation
+from tests.deployed import DEPLOY, TABLE, TEXT
 from tests.looking import LOOKED, LOOKERS
 
 LENS = "width: 64, height: 36, noise: 4, size: 9 kB, latency: 15 ms"
@@ -49,12 +51,27 @@ def test_an_environment_observes_zeros_of_a_picture_that_the_network_has_changed
     env.close()
 
 
+@pytest.mark.parametrize("is_above", [False, True])
+def test_an_overview_shows_what_is_in_a_wide_yard(is_above: bool) -> None:
+    with Simulation(DEPLOY / "yard.yaml") as yard:
+        layout, numbers = yard.frame.layout, yard.frame.numbers
+        overview = Overview(yard.deployment, layout, 320, 180, is_above=is_above)
+        seen = overview.at(0, numbers).image()
+        free = [one for one in layout.entities if "position" in one.offsets and not one.is_absent(numbers)]
+        for entity in free:
+            without = list(numbers)
+            without[entity.offsets["position"]] += 1e3
+            assert (overview.at(0, without).image() != seen).any(axis=2).sum() > 15, entity.name
+        assert len(free) == 6
+
+
 def test_an_environment_observes_pictures() -> None:
     env = FoosimEnv(TABLE, sets=[EYE, LOOKERS], pictures=["camera/eye"])
     assert isinstance(env.observation_space, spaces.Dict)
     first, _ = env.reset()
     second, *_ = env.step(np.zeros(len(env.columns[1])))
     assert env.observation_space.contains(first) and env.observation_space.contains(second)
+    assert not any(np.shares_memory(first[name], second[name]) for name in first)
     assert sorted(second) == ["camera/eye.depth", "camera/eye.image", "readings"]
     sight = env.simulation.readings["camera", "eye"].value
     assert np.array_equal(second["camera/eye.image"], sight.image())  # type: ignore[union-attr]
