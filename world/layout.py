@@ -12,7 +12,7 @@ import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from foosim.common.errors import BadValue, Malformed
 from foosim.common.finding import Location
@@ -37,6 +37,7 @@ from foosim.world.component_types.per_field import Numbers, numbers_of
 from foosim.world.component_types.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
 from foosim.world.spec import WorldSpec
 
+T = TypeVar("T")
 WORLD: Final = "world"
 """Name and model of the entity without a body that has the slots of the world's rules; it is missing in a world whose
 rules have no slots."""
@@ -201,16 +202,16 @@ class Layout:
         """Whether it has rigid bodies whose islands need a solve of their own."""
         self.resting = tuple([entity for entity in entities if STILL_TICKS in entity.offsets])
         """Bodies that may come to rest, in name order."""
-        self._shared: dict[tuple[str, int], tuple[WorldSpec, object]] = {}
+        self._shared: dict[tuple[str, int], tuple[WorldSpec, Any]] = {}
         """By kind and the identity of the world, which is kept with the value."""
         self._digest = b""
 
-    def shared(self, what: str, spec: WorldSpec, make: Callable[[], object]) -> object:
+    def shared(self, what: str, spec: WorldSpec, make: Callable[[], T]) -> T:
         """Return a value shared by all users of this layout in a world, built at its first use."""
-        _, found = self._shared.get((what, id(spec)), (None, None))
-        if found is None:
-            found = make()
-            self._shared[what, id(spec)] = spec, found
+        kept = self._shared.get((what, id(spec)))
+        if kept is None:
+            kept = self._shared[what, id(spec)] = spec, make()
+        found: T = kept[1]
         return found
 
     def of(self, model: str) -> tuple[Entity, ...]:

@@ -97,9 +97,7 @@ class Sight(Seen, frozen=True, dict=True):
 def looks_of(at: Mounting) -> list[Looks]:
     """Return the moving bodies of a layout, which all its cameras share."""
     bodies = Surroundings(at.spec, at.layout).bodies
-    found = at.layout.shared("looks", at.spec, lambda: moving_bodies(bodies, at.layout))
-    assert isinstance(found, list)
-    return found
+    return at.layout.shared("looks", at.spec, lambda: moving_bodies(bodies, at.layout))
 
 
 def moving_bodies(bodies: Mapping[str, Body], layout: Layout) -> list[Looks]:
