@@ -17,7 +17,6 @@ from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairm
 from foosim.deployment.network.link_settings import NO_RADIO, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
-from foosim.deployment.network.settings_text import sends_once
 from foosim.deployment.network.traces import read_opportunities
 from foosim.deployment.schema import Deployment
 from foosim.deployment.validate_network import unheeded
@@ -205,7 +204,7 @@ def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
     settings = use.settings
     loss, burst_packets, burst_ns = residual_of(settings)
     mean_ns, sd_ns, p99_ns = delay_of(settings, files)
-    carried, is_slow = carried_of(settings, files), settings.medium == "wifi" and sends_once(settings)
+    carried, is_slow = carried_of(settings, files), settings.medium == "wifi" and settings.sends_once
     los_m, nlos_m = ranges_of(settings, use.heights_m)
     duty = settings.duty_cycle
     is_limited = settings.is_on_air and duty < 1.0 and carried
@@ -439,7 +438,7 @@ def _queue_ns(settings: Radio, carried: Sequence[Throughput]) -> int | None:
 
 
 def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
-    settings, has_queue = use.settings, "queue" in use.settings.model_fields_set
+    settings = use.settings
     if summary.loss > 0.5:
         yield f"more than half of all packets is lost: {100.0 * summary.loss:.1f} %"
     if settings.ttl_ns is not None and summary.delay_mean_ns > settings.ttl_ns:
@@ -458,7 +457,7 @@ def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
             yield f"{key} {unused}"
     if summary.carried and settings.queue.bytes_max < summary.carried[-1].size:
         yield f"a packet of {summary.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
-    if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and has_queue:
+    if not settings.has_queue and "queue" in settings.model_fields_set:
         yield "the queue has no effect: no rate, no medium"
     if use.rule == NO_RADIO:
         yield "these endpoints have no radio in common, or not that of their rule: nothing passes (no_route)"
