@@ -84,15 +84,14 @@ class Surroundings:
     @property
     def caster(self) -> Caster:
         """The ray caster of the layout, which all components of it share."""
-        return self._layout.shared("caster", self._spec, self._made_caster)
-
-    def _made_caster(self) -> Caster:
-        return Caster(self.scene, self._layout)
+        return self._layout.shared("caster", self._spec, lambda: Caster(self.scene, self._layout))
 
     @property
     def scene(self) -> Scene:
         """The bodies of the layout and the scenery, which all components of it share."""
-        return self._layout.shared("scene", self._spec, self._made_scene)
+        return self._layout.shared(
+            "scene", self._spec, lambda: Scene(self.bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
+        )
 
     @cached_property
     def bodies(self) -> dict[str, Body]:
@@ -107,9 +106,6 @@ class Surroundings:
             if one.name != WORLD
         }
         return {name: body for name, model in models.items() if (body := model.body()) is not None}
-
-    def _made_scene(self) -> Scene:
-        return Scene(self.bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
 
     @staticmethod
     def contacts(view: View, entity: Entity) -> Contacts:
