@@ -123,8 +123,13 @@ class RadioKeys(LinkSettings):
 
     @property
     def sends_once(self) -> bool:
-        """Whether a broadcast is sent once for all its receivers; a base station sends to each by itself."""
+        """Whether a broadcast is one transmission for all its receivers; a base station sends to each by itself."""
         return self.is_on_air and self.published == "broadcast" and self.medium != "lte"
+
+    @property
+    def has_queue(self) -> bool:
+        """Whether packets wait until the one before them is sent."""
+        return self.medium != "none" or self.rate_bps is not None or self.trace is not None
 
 
 LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)

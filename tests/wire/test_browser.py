@@ -32,10 +32,11 @@ PLAYER = {
     "robots": ROBOTS,
     "parameters": {"team": "red"},
 }
+BELOW = ("#camera", ".signs")
 LINK = ("camera", "player-red")
 STAT = "window.foosim.stat"
 WINDOW = 860, 480
-REFRESH_HZ = 5.0
+REFRESH_HZ = 3.0
 CHEAP = "--disable-gpu-compositing"
 """Where a GPU is software, the page around the view costs less without it."""
 DRIVER = "GL Driver Message (OpenGL, Performance"
@@ -196,7 +197,8 @@ def add_and_move(page: Page) -> None:
     page.fill("#add-x", "9")
     page.click("dialog [type=submit]")
     page.until("document.querySelector('dialog .wrong').textContent.includes('outside of the table')")
-    page.fill("#add-x", "0.2")
+    page.fill("#add-x", "0.5")
+    page.fill("#add-y", "0.2")  # where no figure comes
     send(page)
     page.until(f"{STAT}.absent === 0 && !document.querySelector('.entities .absent')")
     assert page.colours() > SHAPES
@@ -427,7 +429,10 @@ def test_a_page_shows_captures_two_in_one_view_and_keeps_its_layout(browser: Pag
         branch(page)
         keep_the_layout(page, address)
     radio = tmp_path / "warehouse.mcap"
-    rehearse(WAREHOUSE.read_text(), WAREHOUSE.name, 50, 2, ["engine=pure"], capture=radio)
+    sets = ["engine=pure", "robots.rover01.sensors.eye={kind: camera, rate: 5 Hz}"]
+    rehearse(WAREHOUSE.read_text(), WAREHOUSE.name, 50, 2, sets, capture=radio)
     with served(lambda: open_sources(radio)) as address, looking(page, address):
         world_is_drawn(page)
         page.until(f"{STAT}.radio > 0")
+        menu, legend = (page.get(f"document.querySelector('{one}').getBoundingClientRect().toJSON()") for one in BELOW)
+        assert 0 < menu["top"] < menu["bottom"] <= legend["top"] < legend["bottom"], "the menu covers no legend"

@@ -47,9 +47,7 @@ class Queue(Stage):
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Queue | None:
-        settings = setup.settings
-        served = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
-        return cls(setup) if served else None
+        return cls(setup) if setup.settings.has_queue else None
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender
