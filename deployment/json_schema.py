@@ -47,14 +47,9 @@ def deployment_schema(*, installed: bool = False) -> dict[str, Any]:
 
 def deployment_schema_text(*, installed: bool = False) -> str:
     """Return the content of deploy/deployment.schema.json: the JSON Schema of a deployment's file, for editors."""
-    presets = {name: list(kit.presets) for name in registry.names("kit") if (kit := _kit(name)).presets}
+    kits = ((name, registry.find("kit", name)) for name in registry.names("kit"))
+    presets = {name: list(kit.presets) for name, kit in kits if isinstance(kit, Kit) and kit.presets}
     return json.dumps(file_schema(deployment_schema(installed=installed), presets), indent=2) + "\n"
-
-
-def _kit(name: str) -> Kit:
-    kit = registry.find("kit", name)
-    assert isinstance(kit, Kit), kit
-    return kit
 
 
 def _any_of(type_name: str, definitions: dict[str, Any], *, installed: bool, is_robot: bool = True) -> dict[str, Any]:

@@ -300,7 +300,10 @@ class Up:
             return
         self._supervisor_watch.answered()
         now_s = self._own_time.at(time.monotonic())
-        self._show_recoveries(status["recoveries"])
+        recoveries = status["recoveries"]
+        while self._shown < len(recoveries) and recoveries[self._shown]["outage_ms"] is not None:  # complete
+            self.display.say(recovery_text(recoveries[self._shown]))
+            self._shown += 1
         if not self._has_ended:
             self.display.show(status, now_s)
         else:  # the supervisor waits as long as there is progress, and so do we
@@ -331,12 +334,6 @@ class Up:
                 self._wanted.add(child.name)
         self._starts = starts
         self._wanted -= {self._process_of.get(name, name) for name in self._stopped}
-
-    def _show_recoveries(self, recoveries: list[dict[str, Any]]) -> None:
-        """Show new recoveries once they are complete."""
-        while self._shown < len(recoveries) and recoveries[self._shown]["outage_ms"] is not None:
-            self.display.say(recovery_text(recoveries[self._shown]))
-            self._shown += 1
 
     def _end_stalled(self, status: dict[str, Any]) -> None:
         """Kill a process that hangs: the run continues without it, and a new one can take part."""
