@@ -29,9 +29,7 @@ def channel_codec(deployment: Deployment, endpoint: str, channel: str) -> Payloa
         its = settings.component_type
         if not its.drawn_by:
             return codec_of(its)
-        found = deployment.shared(f"{endpoint}/{channel}", lambda: _drawn(deployment, settings, endpoint, channel))
-        assert isinstance(found, PayloadCodec)
-        return found
+        return deployment.shared(f"{endpoint}/{channel}", lambda: _drawn(deployment, settings, endpoint, channel))
     if channel in robot.actuators:
         return codec_of(robot.actuators[channel].component_type)
     raise UnknownName(f"{endpoint} has no such channel", channel, [*robot.sensors, CHANNEL_ECHO, *robot.actuators])

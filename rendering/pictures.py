@@ -22,9 +22,7 @@ from foosim.world.spec import WorldSpec
 def drawer_of(spec: WorldSpec, what: str) -> Drawer:
     """Return what draws a world for all its cameras. Raises AssetError without its files, for `what`."""
     world = drawn_world(spec, what)
-    found = spec.shared("drawer", lambda: Drawer(world.scene, world.layout))
-    assert isinstance(found, Drawer)
-    return found
+    return spec.shared("drawer", lambda: Drawer(world.scene, world.layout))
 
 
 class PictureSource(NamedTuple):

@@ -46,9 +46,7 @@ class DrawnWorld(NamedTuple):
 
 def drawn_world(spec: WorldSpec, what: str) -> DrawnWorld:
     """Return the world that all readings of a deployment are drawn in. Raises AssetError without its files."""
-    found = spec.shared("drawn world", lambda: _built(spec, what))
-    assert isinstance(found, DrawnWorld)
-    return found
+    return spec.shared("drawn world", lambda: _built(spec, what))
 
 
 def _built(spec: WorldSpec, what: str) -> DrawnWorld:

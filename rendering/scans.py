@@ -78,7 +78,6 @@ class Scans:
         if found is None:
             world = drawn_world(self._spec, self._what)
             casting = self._spec.shared("casting", lambda: _Casting(world))
-            assert isinstance(casting, _Casting)
             turn = np.array([[seen.qx], [seen.qy], [seen.qz], [seen.qw]])
             found = casting.placement(world.placed(seen, self._what)).fans(
                 np.array([[seen.x], [seen.y], [seen.z]]),

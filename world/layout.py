@@ -35,7 +35,7 @@ from foosim.world.component_types.descriptions import (
 from foosim.world.component_types.jobs import job_slots
 from foosim.world.component_types.per_field import Numbers, numbers_of
 from foosim.world.component_types.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
-from foosim.world.spec import WorldSpec
+from foosim.world.spec import Shared, WorldSpec
 
 WORLD: Final = "world"
 """Name and model of the entity without a body that has the slots of the world's rules; it is missing in a world whose
@@ -201,16 +201,15 @@ class Layout:
         """Whether it has rigid bodies whose islands need a solve of their own."""
         self.resting = tuple([entity for entity in entities if STILL_TICKS in entity.offsets])
         """Bodies that may come to rest, in name order."""
-        self._shared: dict[tuple[str, int], tuple[WorldSpec, object]] = {}
+        self._shared: dict[tuple[str, int], tuple[WorldSpec, Any]] = {}
         """By kind and the identity of the world, which is kept with the value."""
         self._digest = b""
 
-    def shared(self, what: str, spec: WorldSpec, make: Callable[[], object]) -> object:
+    def shared(self, what: str, spec: WorldSpec, make: Callable[[], Shared]) -> Shared:
         """Return a value shared by all users of this layout in a world, built at its first use."""
-        _, found = self._shared.get((what, id(spec)), (None, None))
-        if found is None:
-            found = make()
-            self._shared[what, id(spec)] = spec, found
+        if (what, id(spec)) not in self._shared:
+            self._shared[what, id(spec)] = spec, make()
+        found: Shared = self._shared[what, id(spec)][1]
         return found
 
     def of(self, model: str) -> tuple[Entity, ...]:

@@ -42,6 +42,7 @@ SEEDLESS: Final = frozenset({"fetched", "drawn world", "drawer", "casting"})
 """Shared values that are the same with any seed."""
 
 Section = TypeVar("Section", bound=SpecBase)
+Shared = TypeVar("Shared")
 
 
 class Timed(Protocol):
@@ -130,7 +131,7 @@ class WorldSpec(SpecBase):
     robots: dict[RobotName, SerializeAsAny[RobotSettings]] = Field(min_length=1, max_length=limits.ENTITIES_MAX)
     engine: str = Field(default_factory=default_engine)
     _contents: Contents = PrivateAttr(default_factory=Contents)
-    _shared: dict[str, tuple[object, object]] = PrivateAttr(default_factory=dict)
+    _shared: dict[str, tuple[object, Any]] = PrivateAttr(default_factory=dict)
 
     @cached_property
     def engine_type(self) -> Engine:
@@ -166,13 +167,14 @@ class WorldSpec(SpecBase):
         """Return the settings of a robot or an object; None of an entity that a kit brings."""
         return self.robots.get(name) or self.objects.get(name)
 
-    def shared(self, what: str, make: Callable[[], object]) -> object:
+    def shared(self, what: str, make: Callable[[], Shared]) -> Shared:
         """Return a value shared by all users of this world, built at its first use."""
         owner, found = self._shared.get(what, (None, None))
         if owner is not self:  # a changed copy of a world has what was shared of it
             found = make()
             self._shared = {**self._shared, what: (self, found)}
-        return found
+        made: Shared = found
+        return made
 
     def with_seed(self, seed: int) -> Self:
         """Return the world with another seed. It shares what draws its scene: that does not depend on the seed."""
@@ -216,9 +218,7 @@ class WorldSpec(SpecBase):
     def fetched(self) -> dict[str, bytes]:
         """The contents of files, by path, that came after the world was read without them: pictures are drawn with
         them."""
-        found = self.shared("fetched", dict)
-        assert isinstance(found, dict)
-        return found
+        return self.shared("fetched", dict)
 
     def check_robot_files(self, files: Mapping[str, bytes], optional: Collection[str] = ()) -> None:
         """Raise AssetError for a file of a robot that is missing, has another digest or is invalid.

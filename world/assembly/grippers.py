@@ -35,9 +35,7 @@ class Gripper(NamedTuple):
 
 def grippers_of(spec: WorldSpec, layout: Layout) -> tuple[Gripper, ...]:
     """Return the grippers of a layout, in the order of robots and channels. Raises IncompatibleComponent."""
-    found = layout.shared("grippers", spec, lambda: tuple(_grippers_of(spec, layout)))
-    assert isinstance(found, tuple)
-    return found
+    return layout.shared("grippers", spec, lambda: tuple(_grippers_of(spec, layout)))
 
 
 def _grippers_of(spec: WorldSpec, layout: Layout) -> Iterator[Gripper]:

@@ -53,9 +53,7 @@ class Portable(NamedTuple):
 
 def portables_of(spec: WorldSpec, layout: Layout) -> tuple[Portable, ...]:
     """Return the free rigid objects of a layout, in name order."""
-    found = layout.shared("portables", spec, lambda: _portables_of(spec, layout))
-    assert isinstance(found, tuple)
-    return found
+    return layout.shared("portables", spec, lambda: _portables_of(spec, layout))
 
 
 def _portables_of(spec: WorldSpec, layout: Layout) -> tuple[Portable, ...]:

@@ -99,9 +99,7 @@ class Sight(Seen, frozen=True, dict=True):
 def looks_of(at: Mounting) -> list[Looks]:
     """Return the bodies with moving links that look like something, which all cameras of a layout share."""
     scene = Surroundings(at.spec, at.layout).scene
-    found = at.layout.shared("looks", at.spec, lambda: _looks(scene, at.layout))
-    assert isinstance(found, list)
-    return found
+    return at.layout.shared("looks", at.spec, lambda: _looks(scene, at.layout))
 
 
 def _looks(scene: Scene, layout: Layout) -> list[Looks]:

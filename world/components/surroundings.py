@@ -84,19 +84,12 @@ class Surroundings:
     @property
     def caster(self) -> Caster:
         """The ray caster of the layout, which all components of it share."""
-        found = self._layout.shared("caster", self._spec, self._made_caster)
-        assert isinstance(found, Caster)
-        return found
-
-    def _made_caster(self) -> Caster:
-        return Caster(self.scene, self._layout)
+        return self._layout.shared("caster", self._spec, lambda: Caster(self.scene, self._layout))
 
     @property
     def scene(self) -> Scene:
         """The bodies of the layout and the scenery, which all components of it share."""
-        found = self._layout.shared("scene", self._spec, self._made_scene)
-        assert isinstance(found, Scene)
-        return found
+        return self._layout.shared("scene", self._spec, self._made_scene)
 
     def _made_scene(self) -> Scene:
         bodies = {entity.name: body for entity in self._layout.entities if (body := self._body(entity)) is not None}

@@ -147,25 +147,6 @@ def some_together(what: str, tick: int, made: Any, members: Sequence[Any], rows:
     return called(what, "", tick, type(some[0]).together, some)
 
 
-class SlotReadings:
-    """The readings of several sensors that are numbers of the frame as they are: read as one array."""
-
-    def __init__(self, places: Sequence[Sequence[int]] | NDArray[np.intp]) -> None:
-        """`places` are those of each sensor's numbers, of one length."""
-        import numpy as np
-
-        self._places = np.array(places)
-
-    def taken(self, rows: NDArray[np.intp]) -> SlotReadings:
-        """Return those of some of the sensors, by their rows."""
-        return SlotReadings(self._places[rows])
-
-    def sample(self, view: View) -> NDArray[np.float64]:
-        """Return the numbers, of shape (sensors, numbers)."""
-        numbers: NDArray[np.float64] = view.values[self._places]
-        return numbers
-
-
 class WritableView(View):
     """A view in the part of a tick in which components write to their slots."""
 

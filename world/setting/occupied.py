@@ -27,7 +27,6 @@ def occupied_by(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entit
 
 def _met_upright(spec: WorldSpec, layout: Layout, numbers: Sequence[float], entity: Entity) -> str:
     made = layout.shared("uprights", spec, partial(_Uprights, spec, layout))
-    assert isinstance(made, _Uprights)
     its = made.uprights.get(entity.index)
     if its is None:
         return ""
