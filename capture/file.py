@@ -173,17 +173,14 @@ class CaptureFile:
         elif isinstance(item, Line):
             self._write_view(LOG, item.tick, self._view.log_line(item.level, item.text, item.tick))
         elif isinstance(item, Epoch):
-            self._write_epoch(item)
+            self._add_row(EPOCHS, item.tick, epoch_row(item))
+            self.done.epoch = item.epoch
         elif self._has(item.frame.tick):
             self._pass(item)
             return False
         else:
             self._write_tick(item)
         return True
-
-    def _write_epoch(self, epoch: Epoch) -> None:
-        self._add_row(EPOCHS, epoch.tick, epoch_row(epoch))
-        self.done.epoch = epoch.epoch
 
     def _add_row(self, topic: str, tick: int, row: Row) -> None:
         at_ns = tick * self._tick_ns

@@ -35,7 +35,9 @@ def corners_of(geometry: Geometry) -> Corners:
         return _mesh(geometry)
     if isinstance(geometry, Hull):
         return _mesh(geometry.mesh)
-    radius, sides = geometry.radius, _sides(geometry.radius)
+    radius = geometry.radius
+    fine = [sides for sides in SIDES if radius * (1.0 - _inner(sides) * _inner(sides)) <= FLAT_M]
+    sides = (*fine, SIDES[-1])[0]
     c, s = _circle(sides)
     if isinstance(geometry, Cylinder):
         outer, half = radius * 2.0 / (1.0 + _inner(sides)), geometry.length / 2
@@ -51,12 +53,6 @@ def corners_of(geometry: Geometry) -> Corners:
     normals = np.concatenate([_pairs(low), [[[1.0, 0.0]] * 2] if half else np.zeros((0, 2, 2)), _pairs(high)])
     low, high = low * outer - (0.0, half), high * outer + (0.0, half)
     return _turned(_pairs(np.concatenate([low, high] if half else [low, high[1:]])), normals, c, s)
-
-
-def _sides(radius: float) -> int:
-    """Return how many sides a circle has."""
-    fine = (sides for sides in SIDES if radius * (1.0 - _inner(sides) * _inner(sides)) <= FLAT_M)
-    return next(fine, SIDES[-1])
 
 
 def _circle(sides: int) -> Corners:

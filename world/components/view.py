@@ -30,11 +30,12 @@ Result = TypeVar("Result")
 class ComponentError(Failed):
     """A component has raised, or returned an invalid value: each node that computes its tick would fail as it did.
 
-    `component` is its name on `entity`, `cause` has its traceback.
+    `component` is its name on `entity`, which is empty, or the world, for other components; `cause` has its traceback.
     """
 
     def __init__(self, component: str, entity: str, tick: int, cause: BaseException) -> None:
-        super().__init__(f"{called_of(component, entity)} failed at tick {tick}: {failure_of(cause)}")
+        whose = {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
+        super().__init__(f"{component}{whose} failed at tick {tick}: {failure_of(cause)}")
         self.component, self.entity, self.tick, self.cause = component, entity, tick, cause
 
 
@@ -45,11 +46,6 @@ class IncompatibleComponent(BadValue):
     def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
         super().__init__(what, value, nearest)
         self.path = path
-
-
-def called_of(component: str, entity: str) -> str:
-    """Return the component and its entity in words; `entity` is empty, or that of the world, for other components."""
-    return component + {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
 
 
 def component_error(component: str, entity: str, tick: int, error: BaseException) -> ComponentError:
