@@ -18,7 +18,8 @@ from foosim.common.units import Quantity
 from foosim.world.component_types.quantities import Metres
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.beams import Beams, BeamSensor, body_of, hull_middle, mounted_at, way_out
+from foosim.world.components.beams import Beams, BeamSensor, hull_middle, mounted_at, way_out
+from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting
 
 Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "100 m")]
@@ -48,7 +49,7 @@ class Proximity(BeamSensor):
     field = "ways"
 
     def __init__(self, settings: ProximitySettings, at: Mounting) -> None:
-        link = body_of(at).links[0]
+        link = body_at(at).links[0]
         middle = hull_middle(link)
         turns = [2.0 * pi * ray / settings.rays for ray in range(settings.rays)]
         directions = [(cos(turn), sin(turn), 0.0) for turn in turns]

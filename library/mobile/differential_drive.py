@@ -28,18 +28,7 @@ BLUE: Final[Colour] = (0.15, 0.35, 0.75, 1.0)
 GREEN: Final[Colour] = (0.15, 0.55, 0.35, 1.0)
 WHEELS: Final = {"heading": 1, "wheel_speeds": 2, "wheel_travel": 2}
 """The heading of a robot, the speeds of its rims, and how far its wheels have turned."""
-
-
-STATE: Final = (
-    "position",
-    "orientation",
-    "linear_velocity",
-    "angular_velocity",
-    "heading",
-    "wheel_speeds",
-    "wheel_travel",
-    "blocked",
-)
+STATE: Final = (*BODY, *WHEELS, "blocked")
 """The fields that this motion writes."""
 STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0))
 

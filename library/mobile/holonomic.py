@@ -10,13 +10,7 @@ import numpy as np
 from foosim.common.spec_base import default
 from foosim.library.mobile.arcs import along_arcs, approached, approached_together
 from foosim.library.mobile.set_points import set_points_of
-from foosim.library.mobile.vehicles import (
-    Acceleration,
-    Speed,
-    TurnRate,
-    Vehicle,
-    VehicleModel,
-)
+from foosim.library.mobile.vehicles import Acceleration, Speed, TurnRate, Vehicle, VehicleModel
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
 from foosim.world.components.base import Motion
@@ -43,15 +37,7 @@ class HolonomicRobot(Vehicle):
     turn_rate: TurnRate = default("180 deg/s")
 
 
-STATE: Final = (
-    "position",
-    "orientation",
-    "linear_velocity",
-    "angular_velocity",
-    "heading",
-    "base_velocity",
-    "blocked",
-)
+STATE: Final = (*BODY, "heading", "base_velocity", "blocked")
 """The fields that this motion writes."""
 STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 

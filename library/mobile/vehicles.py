@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
 
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
+from foosim.library.mobile.hall_settings import Rover
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
@@ -56,28 +57,22 @@ class Vehicle(RobotSettings):
     antenna_height: Antenna = default("35 cm")
 
 
-def body_of(vehicle: Vehicle, name: str, model: str, colour: Colour, speed_limit: float) -> Body:
+def body_of(
+    vehicle: Vehicle | Rover, name: str, model: str, colour: Colour, speed_limit: float, surface: str = HULL
+) -> Body:
     """Return a round hull, a mark ahead on it, and the antenna's mast; it has no mass, since no engine moves it."""
     radius, height = vehicle.radius, vehicle.height
-    hull = Shape(Cylinder(radius, height), HULL, colour, (0.0, 0.0, height / 2), radio=METAL)
-    shapes = (hull, mark_of(vehicle, HULL), *mast(height, vehicle.antenna_height, HULL))
+    hull = Shape(Cylinder(radius, height), surface, colour, (0.0, 0.0, height / 2), radio=METAL)
+    shapes = (hull, mark_of(vehicle, surface), *mast(height, vehicle.antenna_height, surface))
     link = Link(name, "free", shapes, 0.0, ORIGIN)
     return Body(name, model, ORIGIN, (link,), (0.0, 0.0, vehicle.antenna_height), speed_limit)
 
 
-def mark_of(vehicle: Vehicle, surface: str) -> Shape:
+def mark_of(vehicle: Vehicle | Rover, surface: str) -> Shape:
     """Return the mark on a hull that is ahead of its middle."""
     radius, height = vehicle.radius, vehicle.height
     mark = Box((radius / 4, radius / 8, height / 16))
     return Shape(mark, surface, DARK, (radius / 2, 0.0, height + height / 16), radio=PLASTIC)
-
-
-def standing(
-    name: str, model: str, at: Vector, joint: Literal["free", "fixed"], shapes: tuple[Shape, ...], antenna_m: float
-) -> Body:
-    """Return a body of one link. It has no mass: no engine moves it."""
-    link = Link(name, joint, shapes, 0.0, ORIGIN)
-    return Body(name, model, at, (link,), (0.0, 0.0, antenna_m))
 
 
 def mast(bottom: float, top: float, surface: str) -> tuple[Shape, ...]:

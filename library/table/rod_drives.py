@@ -17,8 +17,8 @@ from foosim.common.units import Quantity
 from foosim.library.table.settings import table_of
 from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import SetPointActuator, need, slot
+from foosim.world.components.entities import made_model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.moving.upright import made_model
 from foosim.world.scene import load_of
 
 SLIDE, SPIN = 0, 1

@@ -168,7 +168,7 @@ class Actuator(Component):
 
 
 class SetPointActuator(Actuator):
-    """An actuator that keeps the numbers of the last command, which has no other fields, in a slot."""
+    """An actuator that keeps all fields of the last command, each a number, in a slot."""
 
     _set_point: Slot
     """Declared by its class."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from foosim.common.errors import BadValue
 from foosim.world.components.base import Sensor
-from foosim.world.components.entities import mounting_of
 from foosim.world.components.mounted import Mounted, MountedTogether
 from foosim.world.components.rows import Rows
 from foosim.world.components.surroundings import Surroundings
@@ -19,7 +18,7 @@ from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
 from foosim.world.rays.shapes import rotated_each
 from foosim.world.rays.solids import Meshes, solid_of
-from foosim.world.scene import Body, Link, Vector, shape_box
+from foosim.world.scene import Link, Vector, shape_box
 
 Directions: TypeAlias = Sequence[Vector]
 
@@ -29,7 +28,6 @@ class Beams:
 
     def __init__(self, at: Mounting, where: MountedAt, directions: Directions, range_m: float) -> None:
         """`directions` are unit vectors in the mount's frame. Raises BadValue without a body, or without the link."""
-        body_of(at)
         self.around, self.entity, self.mount = Surroundings(at.spec, at.layout), at.robot, Mounted(at, where)
         self.directions, self.range_m = np.array(directions).reshape(-1, 3), range_m
 
@@ -122,15 +120,6 @@ class Distances(Rows):
         if self._hulls is not None:
             found = found - self._hulls
         return np.asarray(np.minimum(np.maximum(found, self._least), self._ranges))
-
-
-def body_of(at: Mounting) -> Body:
-    """Return the body of the robot that a component is on. Raises BadValue without one."""
-    made = at.robot.kind.factory(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
-    body: Body | None = made.body()
-    if body is None:
-        raise BadValue("it sends rays from a robot without a body", at.robot.name)
-    return body
 
 
 def hull_middle(link: Link) -> Vector:

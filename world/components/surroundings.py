@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from foosim.world.components.entities import mounting_of
+from foosim.world.components.entities import made_model
 from foosim.world.components.view import SensingView, View
 from foosim.world.fixed_scenery import fixed_shapes
 from foosim.world.kinematics import forward_kinematics
@@ -108,6 +108,5 @@ class Surroundings:
         if entity.name == WORLD:
             return None
         if entity.name not in self._bodies:
-            at = mounting_of(self._spec, self._layout, entity)
-            self._bodies[entity.name] = entity.kind.factory(self._spec.settings_of(entity.name), at).body()
+            self._bodies[entity.name] = made_model(self._spec, self._layout, entity).body()
         return self._bodies[entity.name]
