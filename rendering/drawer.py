@@ -88,7 +88,9 @@ class Drawer:
         lens = lens_of(optics) if any(optics.distortion) else None
         margin = (0, 0) if lens is None else lens.margin
         total = np.zeros((optics.height + 2 * margin[1], optics.width + 2 * margin[0], 3), np.uint16)
-        n, view = optics.samples, _view(optics, margin, position, orientation)
+        n = optics.samples
+        focal = focal_length(optics.fov, optics.width) * n
+        view = view_of(position, orientation, focal, total.shape[1] * n, total.shape[0] * n, optics.near, optics.far)
         for earlier in range(1 - count, 1):
             moved = advanced(poses, speeds, earlier * optics.exposure / count)
             frame = self._frame(view, optics, numbers, moved)
@@ -190,14 +192,6 @@ class Drawer:
         m = view.matrix
         clip = np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z + m[i + 3] for i in (0, 4, 8)], axis=2)
         return facing_at(clip, model.facing[corners], place[triangles], *_centres(view, pixels))
-
-
-def _view(optics: Optics, margin: tuple[int, int], position: Vector, orientation: Quaternion) -> View:
-    """Return the view of a camera's samples at a pose, with more columns and rows at each side."""
-    n = optics.samples
-    width, height = (optics.width + 2 * margin[0]) * n, (optics.height + 2 * margin[1]) * n
-    focal = focal_length(optics.fov, optics.width) * n
-    return view_of(position, orientation, focal, width, height, optics.near, optics.far)
 
 
 def _centres(view: View, pixels: Ints) -> tuple[Floats32, Floats32]:

@@ -112,7 +112,7 @@ def _mesh(mesh: Mesh) -> Corners:
     u, v = positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0]
     areas = np.stack([u[:, i - 2] * v[:, i - 1] - u[:, i - 1] * v[:, i - 2] for i in range(3)], axis=1)
     faces = _unit(areas)
-    _, place = distinct(mesh.vertices)
+    _, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
     corner = place[mesh.triangles].reshape(-1)
     order = np.argsort(corner, kind="stable")
     counts = np.bincount(corner)
@@ -125,16 +125,6 @@ def _mesh(mesh: Mesh) -> Corners:
     here, there = here[smooth], there[smooth]
     sums = [np.bincount(here, areas[there // 3, i], len(corner)) for i in range(3)]
     return positions, _unit(np.stack(sums, axis=1)).reshape(-1, 3, 3)
-
-
-def distinct(rows: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the different ones of rows, in a fixed order, and the place of each row among them."""
-    order = np.lexsort(rows.T)
-    is_first = np.ones(len(rows), np.bool_)
-    (rows[order[1:]] != rows[order[:-1]]).any(axis=1, out=is_first[1:])
-    place = np.empty(len(rows), np.intp)
-    place[order] = np.cumsum(is_first) - 1
-    return rows[order[is_first]], place
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -308,7 +308,7 @@ def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callabl
     text = fleet_text(1, robot, "players={}", "nodes={one: {robots: ['*']}}", "network={}")
     done = rehearse(text, "x.yaml", 20, 1)
     assert not done.json["failed"], done.json["reason"]
-    with pytest.raises(DeploymentError, match="robots.mast.sensors: .*mast has no body to carry it, 'ghost'"):
+    with pytest.raises(DeploymentError, match=r"robots.mast.sensors: .*mast has no body to carry it, 'ghost'"):
         load_deployment(text.replace("own_form:Mast", "own_form:Ghost"), "x.yaml")
 
 
