@@ -61,7 +61,7 @@ class TinyRenderer:
         scenery = list(dict.fromkeys(shape.name for shape in scene.scenery))
         for shape in drawn(scene.scenery):
             self._add(shape, len(layout.names) + scenery.index(shape.name), shape.position, shape.orientation)
-        moving = moving_links(scene)
+        moving = moving_links(scene.bodies)
         bodies = sorted(scene.bodies.items())
         looks = iter(looks_of(link for _, body in bodies for link in body.links))
         for name, body in bodies:
@@ -124,7 +124,7 @@ class TinyRenderer:
 def poses_of(scene: Scene, layout: Layout, numbers: list[float]) -> NDArray[np.float64]:
     """Return the poses (n, 7) of the links that move."""
     found = []
-    for name, index in moving_links(scene):
+    for name, index in moving_links(scene.bodies):
         _, position, orientation = forward_kinematics(scene.bodies[name], layout[name], numbers)[index]
         found.append((*position, *orientation))
     return np.array(found).reshape(-1, 7)

@@ -229,7 +229,7 @@ def _video(out: Path, frames: Iterable[NDArray[np.uint8]], width: int, height: i
     count = 0
     with ExitStack() as stack:
         part = stack.enter_context(new_file(out))
-        kind = out.suffix.lstrip(".") or "mp4"
+        kind = {"": "mp4", ".mkv": "matroska"}.get(out.suffix, out.suffix[1:])
         command = [program, "-loglevel", "error", "-y", *given, *even, "-f", kind, str(part)]
         process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.PIPE))
         assert process.stdin is not None

@@ -7,11 +7,13 @@ network.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sin, tan
+from itertools import product
 from typing import Final
 
-from foosim.rendering.pictures import Pictures, PictureSource, drawer_of
+from foosim.common.exact_math import tan
+from foosim.rendering.pictures import Pictures, PictureSource
 from foosim.rendering.readings import drawn_world
+from foosim.world.assembly.world import initial_numbers
 from foosim.world.component_types.payloads import PayloadCodec
 from foosim.world.components.cameras import DEFAULT_FOV, PictureSettings, towards
 from foosim.world.components.entities import mounting_of
@@ -19,21 +21,34 @@ from foosim.world.components.in_view import InView
 from foosim.world.components.optics import Optics
 from foosim.world.components.sight import Sight, looks_of
 from foosim.world.components.view import View
+from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
-from foosim.world.scene import Quaternion, Scene, Vector, drawn, enclosing, moved, shape_box, swept_box
+from foosim.world.scene import (
+    ORIGIN,
+    Quaternion,
+    Vector,
+    conjugate,
+    drawn,
+    enclosing,
+    moved,
+    rotate,
+    shape_box,
+    swept_box,
+)
 from foosim.world.spec import WorldSpec
 
 OVERVIEW: Final = "overview"
 FROM: Final[Vector] = (-0.36, -0.48, 0.8)
 """The direction from the middle of the world to the eye of an overview, of length 1."""
 FAR: Final = 4.0
-"""How far an overview sees, in diameters of the world."""
+"""How far an overview sees, in its distances from the middle."""
 ABOVE: Final = "view from above"
 FOV_ABOVE: Final = 0.6
+UP: Final[Vector] = (0.0, 0.0, 1.0)
 DOWN: Final[Quaternion] = (-0.5, 0.5, 0.5, 0.5)
 """Looks straight down, with the world's x to the right and its y up."""
 GROUND_M: Final = 0.05
-"""Lower scenery is ground: it does not widen the view from above."""
+"""Lower scenery is ground: it does not widen an overview."""
 
 
 def cameras_of(spec: WorldSpec) -> dict[tuple[str, str], PictureSettings]:
@@ -82,32 +97,43 @@ class Overview:
 
     def __init__(self, spec: WorldSpec, layout: Layout, width: int, height: int, *, is_above: bool = False) -> None:
         """Raises AssetError without a mesh of the world."""
+        name, fov, way, self._turned = OVERVIEW, DEFAULT_FOV, FROM, towards(moved(ORIGIN, FROM, -1.0))
         if is_above:
-            name, fov, self._turned = ABOVE, FOV_ABOVE, DOWN
-            (low_x, low_y, low), (high_x, high_y, high) = _standing(drawn_world(spec, ABOVE).scene)
-            away = max(high_x - low_x, (high_y - low_y) * width / height, GROUND_M) / (2.0 * tan(fov / 2.0))
-            self._eye: Vector = ((low_x + high_x) / 2.0, (low_y + high_y) / 2.0, high + away)
-            away += high - low
-        else:
-            name, fov, self._turned = OVERVIEW, DEFAULT_FOV, towards(moved((0.0, 0.0, 0.0), FROM, -1.0))
-            middle, radius = drawer_of(spec, OVERVIEW).bounds
-            away = 0.8 * max(radius, 0.1) / sin(fov * min(1.0, height / width) / 2.0)
-            self._eye = moved(middle, FROM, away)
+            name, fov, way, self._turned = ABOVE, FOV_ABOVE, UP, DOWN
+        low, high = _shown(spec, layout, name)
+        middle = moved(moved(low, low, -0.5), high, 0.5)
+        corners = product((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
+        seen = [rotate(conjugate(self._turned), moved(corner, middle, -1.0)) for corner in corners]
+        away = max([max(abs(y), abs(z) * width / height) / tan(fov / 2.0) - x for x, y, z in seen])
+        self._eye = moved(middle, way, away)
         optics = Optics(width, height, fov, 0.01 * away, FAR * away, samples=2)
         self.pictures: Final = Pictures(spec, PictureSource(optics, ("image",), name), name, name)
         self._in_view = InView(optics, looks_of(mounting_of(spec, layout, layout.entities[0])))
 
     def at(self, tick: int, numbers: Sequence[float]) -> Sight:
         """Return the reading at a frame."""
-        links = self._in_view.links(list(numbers), self._eye, self._turned)
-        sight = Sight(float(tick), *self._eye, *self._turned, tuple(links))
+        bodies = self._in_view.moving(list(numbers), self._eye, self._turned)
+        sight = Sight(float(tick), *self._eye, *self._turned, tuple(bodies))
         sight.kept["drawn_by"] = self.pictures
         return sight
 
 
-def _standing(scene: Scene) -> tuple[Vector, Vector]:
-    """Return the box around all that stands: scenery above the ground, else bodies on fixed bases, else 10 m."""
+def _shown(spec: WorldSpec, layout: Layout, name: str) -> tuple[Vector, Vector]:
+    """Return the box around what an overview shows: scenery above the ground and bodies where they begin, else 10 m.
+
+    From above, scenery that stands shows where bodies on fixed bases are.
+    """
+    scene, numbers = drawn_world(spec, name).scene, initial_numbers(spec, layout)
     boxes = [box for shape in drawn(scene.scenery) if (box := shape_box(shape))[1][2] > GROUND_M]
-    fixed = [body for body in scene.bodies.values() if not body.is_free and any(link.shapes for link in body.links)]
-    boxes = boxes or [swept_box(body) for body in fixed]
+    are_fixed_shown = name == OVERVIEW or not boxes
+    for body in scene.bodies.values():
+        entity = layout[body.name]
+        if not any(link.shapes for link in body.links) or entity.is_absent(numbers):
+            continue
+        if body.is_free:
+            base = forward_kinematics(body, entity, numbers)[0][1]
+            low, high = swept_box(body)
+            boxes.append((moved(low, base, 1.0), moved(high, base, 1.0)))
+        elif are_fixed_shown:
+            boxes.append(swept_box(body))
     return enclosing(boxes or [((-5.0, -5.0, 0.0), (5.0, 5.0, 0.0))])

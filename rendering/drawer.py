@@ -56,8 +56,6 @@ class Drawer:
     def __init__(self, scene: Scene, layout: Layout) -> None:
         self._model = model = Model(scene, layout)
         self.things = model.things
-        self.bounds = model.bounds
-        """The middle and the radius of a sphere around what stands (m)."""
         self._facing = np.zeros(len(model.triangles) + 1, np.float32)
         self._flat = coloured(model.colours, self._facing)
         self._light(np.arange(len(model.triangles)))

@@ -44,7 +44,7 @@ class Model:
         building = _Building()
         for number, one in enumerate(scenery.values(), len(layout.names)):
             building.add(number, one, ORIGIN, UPRIGHT)
-        moving = {place: number for number, place in enumerate(moving_links(scene))}
+        moving = {place: number for number, place in enumerate(moving_links(scene.bodies))}
         still = [0.0] * layout.size  # poses of what stands do not depend on them
         later: list[tuple[int, int, tuple[Shape, ...]]] = []
         bodies = sorted(scene.bodies.items())

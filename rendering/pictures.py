@@ -15,7 +15,7 @@ from foosim.rendering.drawer import Drawer, Drawn
 from foosim.rendering.readings import drawn_world
 from foosim.world.components.cameras import PictureSettings
 from foosim.world.components.optics import Optics
-from foosim.world.components.sight import LINK, LINK_BLURRED, Sight
+from foosim.world.components.sight import Sight
 from foosim.world.spec import WorldSpec
 
 
@@ -87,7 +87,7 @@ class Pictures:
 
     def _draw(self, sight: Sight) -> Drawn:
         optics, drawer = self._optics, drawer_of(self._spec, self._what)
-        links = drawn_world(self._spec, self._what).placed(sight, self._what, LINK_BLURRED if optics.exposure else LINK)
+        links = drawn_world(self._spec, self._what).placed(sight, self._what, optics.exposure)
         if not 0.0 <= sight.tick <= COUNTER_MAX:
             raise Malformed(f"{self._what}: no tick, {sight.tick:g}")
         self.draws += 1
@@ -97,6 +97,6 @@ class Pictures:
             (sight.qx, sight.qy, sight.qz, sight.qw),
             links.numbers,
             links.poses,
-            links.more if optics.exposure else None,
+            links.velocities if optics.exposure else None,
             draw_words(self._key, int(sight.tick))[0] if optics.noise else 0,
         )

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from foosim.rendering.readings import DrawnWorld, Links, drawn_world
+from foosim.world.components.optics import moving_links
 from foosim.world.components.sight import Seen
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.rays.boxes import Floats
@@ -26,7 +27,7 @@ class _Casting:
 
     def __init__(self, world: DrawnWorld) -> None:
         scene, layout = world.scene, world.layout
-        numbers = {link: number for number, link in enumerate(world.links)}
+        numbers = {link: number for number, link in enumerate(moving_links(scene.bodies))}
         still: list[Part] = [(shape, NOTHING, 0, ORIGIN, UPRIGHT) for shape in scene.scenery]
         moving: list[Part] = []
         for name, body in sorted(scene.bodies.items()):

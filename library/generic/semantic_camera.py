@@ -63,7 +63,7 @@ class SemanticCamera(Sensor):
         self._targets = [
             (entity, points_of(self._around, entity))
             for entity in self._around.tagged(settings.tag)
-            if entity.name in self._around.scene.bodies and entity is not at.robot
+            if entity.name in self._around.bodies and entity is not at.robot
         ]
 
     @staticmethod
@@ -82,7 +82,7 @@ class SemanticCamera(Sensor):
                 continue
             poses = self._around.poses(view, entity)
             arms = [moved(moved(poses[n][1], rotate(poses[n][2], point), 1.0), place, -1.0) for n, point in points]
-            inside = [arm for arm in arms if self._in_view.touches(its := rotate(back, arm), 0.0) and its[0] >= near]
+            inside = [arm for arm in arms if self._in_view.away(its := rotate(back, arm)) <= 0.0 and its[0] >= near]
             if inside:
                 where = rotate(back, moved(poses[0][1], place, -1.0))
                 ways += inside
@@ -115,7 +115,7 @@ class SemanticCamera(Sensor):
 def points_of(around: Surroundings, entity: Entity) -> list[tuple[int, Vector]]:
     """Return the index of the link and the place in its frame (m) of each point that rays go to."""
     found: list[tuple[int, Vector]] = []
-    for index, link in enumerate(around.scene.bodies[entity.name].links):
+    for index, link in enumerate(around.bodies[entity.name].links):
         if link.shapes:
             low, high = enclosing([shape_box(shape) for shape in link.shapes])
             sides = moved(high, low, -1.0)

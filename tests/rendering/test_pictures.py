@@ -112,7 +112,7 @@ class Table:
         deployment = load_deployment(TABLE.read_text(), TABLE.name)
         self.layout = build_layout(deployment)
         self.scene = build_scene(deployment, self.layout)
-        self.links = moving_links(self.scene)
+        self.links = moving_links(self.scene.bodies)
         self.poses = poses_of(self.scene, self.layout, initial_numbers(deployment, self.layout))
 
     def moved(self, frame: int) -> Any:
@@ -162,7 +162,7 @@ def test_what_moves_looks_as_if_it_stood_there() -> None:
     link = next(link for link in body.links if any(isinstance(one.geometry, Box) for one in link.shapes))
     place = (0.1, -0.05, 0.2)
     drawer = Drawer(Scene({"red.goal": body}, ()), table.layout)
-    number = [index for _, index in moving_links(Scene({"red.goal": body}, ()))].index(body.links.index(link))
+    number = [index for _, index in moving_links({"red.goal": body})].index(body.links.index(link))
     for turned in (from_rpy(0.3, 1.0, 0.4), from_rpy(0.3, -0.9, 2.4)):
         there = []
         for one in looks_of([link])[0][1]:

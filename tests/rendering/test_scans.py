@@ -17,10 +17,13 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import initial_numbers
 from foosim.world.components.fitted import sensors_of
+from foosim.world.components.sight import moving_bodies, sphere_of
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import SensingView, View
+from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout, build_layout
 from foosim.world.rays.shapes import rotated
+from foosim.world.scene import moved, rotate
 from tests.whole_worlds import NAME, assets, yard
 from tests.world.test_beam_sensors import PLACED
 
@@ -39,7 +42,8 @@ def read(deployment: Deployment, layout: Layout, robot: str, numbers: Sequence[f
 
 
 def test_a_scan_is_that_of_rays_in_the_frame() -> None:
-    """Of bodies of all kinds, some beyond the range; to the bit where no link is fixed to a free one."""
+    """Of bodies of all kinds, some beyond the range; to the bit where no link is fixed to a free one. All links are
+    within the spheres by which bodies are found in view."""
     where = {"scout": "at: {x: 20 cm, z: 30 cm, pitch: 10 deg}", "goer-2": "at: {z: 60 cm}, look_at: {entity: sphere}"}
     sets = [f"robots.{robot}.sensors.eye={{{SCAN}, {at}}}" for robot, at in where.items()]
     text, files = pin_assets(apply_sets(yard(), NAME, sets), NAME, assets())
@@ -55,6 +59,14 @@ def test_a_scan_is_that_of_rays_in_the_frame() -> None:
                 at = entity.offsets.get(field, 0)
                 count = entity.counts.get(field, 0) if not entity.is_absent(numbers) else 0
                 numbers[at : at + count] = (np.array(numbers[at : at + count]) + rng.normal(0.0, sigma, count)).tolist()
+        for looks in moving_bodies(around.bodies, layout):
+            poses = forward_kinematics(looks.body, looks.entity, numbers)
+            at, reach = looks.free_at, looks.radius + sum(abs(numbers[place]) for place in looks.slides)
+            place = looks.place if at < 0 else numbers[at : at + 3]
+            for index, _ in looks.links:
+                middle, radius = sphere_of(looks.body.links[index]) or ((0.0, 0.0, 0.0), 0.0)
+                there = moved(poses[index][1], rotate(poses[index][2], middle), 1.0)
+                assert np.linalg.norm(np.subtract(there, place)) + radius <= reach + 1e-9
         for robot in where:
             scan = read(deployment, layout, robot, numbers)
             ways = rotated(np.array([[scan.qx], [scan.qy], [scan.qz], [scan.qw]]), directions.T).T
@@ -108,7 +120,7 @@ def test_what_is_no_scan_is_refused(fleet_text: Text) -> None:
     with pytest.raises(BadValue, match="drawn from the samples of players, clients and captures"):
         alone.ranges()
     scan = read(deployment, layout, "rover01", numbers)
-    changed = structs.replace(scan, links=(99.0, *scan.links[1:8]))
+    changed = structs.replace(scan, bodies=(99.0, *scan.bodies[1:8]))
     changed.kept["drawn_by"] = scan.kept["drawn_by"]
-    with pytest.raises(Malformed, match="numbers of links are 0 to"):
+    with pytest.raises(Malformed, match="numbers of bodies are 0 to"):
         changed.points()

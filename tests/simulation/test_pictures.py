@@ -12,9 +12,11 @@ from gymnasium import spaces
 from foosim.capture.reader import open_capture
 from foosim.common.errors import UnknownName
 from foosim.deployment.channel_kinds import channel_codec
+from foosim.rendering.cameras import Overview
 from foosim.simulation.env import FoosimEnv
 from foosim.simulation.run import rehearse
-from tests.deployed import TABLE, TEXT
+from foosim.simulation.simulation import Simulation
+from tests.deployed import DEPLOY, TABLE, TEXT
 from tests.looking import LOOKED, LOOKERS
 
 LENS = "width: 64, height: 36, noise: 4, size: 9 kB, latency: 15 ms"
@@ -47,6 +49,20 @@ def test_an_environment_observes_zeros_of_a_picture_that_the_network_has_changed
     seen = [bool(env.step(np.zeros(len(env.columns[1])))[0]["camera/eye.image"].any()) for _ in range(12)]
     assert ("camera", "eye") in env.simulation.agents["waver"].newest and not any(seen)
     env.close()
+
+
+@pytest.mark.parametrize("is_above", [False, True])
+def test_an_overview_shows_what_is_in_a_wide_yard(is_above: bool) -> None:
+    with Simulation(DEPLOY / "yard.yaml") as yard:
+        layout, numbers = yard.frame.layout, yard.frame.numbers
+        overview = Overview(yard.deployment, layout, 320, 180, is_above=is_above)
+        seen = overview.at(0, numbers).image()
+        free = [one for one in layout.entities if "position" in one.offsets and not one.is_absent(numbers)]
+        for entity in free:
+            without = list(numbers)
+            without[entity.offsets["position"]] += 1e3
+            assert (overview.at(0, without).image() != seen).any(axis=2).sum() > 15, entity.name
+        assert len(free) == 6
 
 
 def test_an_environment_observes_pictures() -> None:

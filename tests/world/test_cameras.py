@@ -19,11 +19,9 @@ from foosim.world.assembly.world import initial_numbers
 from foosim.world.components import cameras
 from foosim.world.components.cameras import towards
 from foosim.world.components.fitted import sensors_of
-from foosim.world.components.optics import moving_links
-from foosim.world.components.sight import LINK, LINK_BLURRED, NUMBERS_MAX, Sight
+from foosim.world.components.sight import Sight, moving_bodies
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import SensingView
-from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import build_layout
 from foosim.world.scene import rotate
 from tests.deployed import deployed
@@ -60,16 +58,14 @@ def reading(deployment: Deployment, numbers: list[float], robot: str = "camera",
 
 
 def everything(deployment: Deployment, numbers: list[float], sight: Sight) -> Sight:
-    """Return a reading with all moving links of present entities instead of those in view."""
+    """Return a reading with all moving bodies that are present instead of those in view."""
     layout = build_layout(deployment)
-    scene = Surroundings(deployment, layout).scene
-    links: list[float] = []
-    for number, (name, index) in enumerate(moving_links(scene)):
-        if not layout[name].is_absent(numbers):
-            _, position, orientation = forward_kinematics(scene.bodies[name], layout[name], numbers)[index]
-            links += [float(number), *position, *orientation]
-    assert set(zip(*[iter(sight.links)] * 8, strict=True)) < set(zip(*[iter(links)] * 8, strict=True))
-    found = structs.replace(sight, links=tuple(links))
+    bodies: list[float] = []
+    for number, looks in enumerate(moving_bodies(Surroundings(deployment, layout).bodies, layout)):
+        if not looks.entity.is_absent(numbers):
+            bodies += [float(number), *(one for first, end in looks.pose for one in numbers[first:end])]
+    assert len(sight.bodies) < len(bodies)
+    found = structs.replace(sight, bodies=tuple(bodies))
     found.kept["drawn_by"] = sight.kept["drawn_by"]
     return found
 
@@ -79,7 +75,7 @@ def everything(deployment: Deployment, numbers: list[float], sight: Sight) -> Si
     [
         "at: {x: 30 cm, z: 40 cm, pitch: 70 deg}",
         "at: {x: -1 m, z: 60 cm, pitch: 40 deg}, fov: 12 deg",
-        "at: {y: -50 cm, z: 50 cm}, look_at: {x: 40 cm}, width: 40, height: 90",
+        "at: {y: -50 cm, z: 50 cm}, look_at: {x: 40 cm}, fov: 15 deg, width: 40, height: 90",
         "at: {x: 30 cm, z: 50 cm, pitch: 70 deg}, fov: 50 deg, distortion: {k1: -0.2, p1: 0.01}",
     ],
 )
@@ -98,21 +94,34 @@ def test_a_picture_of_what_is_in_view_is_that_of_all_that_moves(view: str) -> No
     assert pictures.draws == drawn + 3
 
 
-def test_links_have_velocities_where_they_blur() -> None:
+def test_bodies_have_velocities_where_they_blur() -> None:
     deployment = with_eye(f"kind: camera, {ABOVE}, exposure: 10 ms")
-    sight = reading(deployment, moved(deployment))
-    rows = np.array(sight.links).reshape(-1, 14)
-    sharp = reading(with_eye(f"kind: camera, {ABOVE}"), moved(deployment))
-    assert np.array_equal(rows[:, :8], np.array(sharp.links).reshape(-1, 8))
-    assert np.array_equal(np.unique(rows[:, 9:11][:, 0]), [0.0, 0.5]) and np.abs(rows[:, 12]).max() == 20.0
+    sight, sharp = (reading(one, moved(one)) for one in (deployment, with_eye(f"kind: camera, {ABOVE}")))
+    ball, rods = sight.bodies[:14], np.array(sight.bodies[14:]).reshape(8, 5)
+    assert ball[:8] == sharp.bodies[:8] and np.array_equal(rods[:, :3].ravel(), sharp.bodies[8:])
+    assert (rods[:, 3:] == (0.5, 20.0)).all()
     assert not np.array_equal(sight.image(), sharp.image())
 
 
-def test_links_beside_the_view_throw_shadows_into_it() -> None:
-    view = "at: {z: 40 cm, pitch: 90 deg}, fov: 10 deg"
+def test_a_body_is_in_view_while_it_blurs_into_it() -> None:
+    """Of a ball that has left the view by 15 cm within an exposure of 10 ms, and of a slower one."""
+    deployment = with_eye("kind: camera, at: {x: 5 m, z: 1 m, pitch: 90 deg}, fov: 10 deg, exposure: 10 ms")
+    layout = build_layout(deployment)
+    numbers = moved(deployment)
+    at = layout["ball"].offsets["position"]
+    numbers[at : at + 3] = [5.0, 0.25, 0.5]
+    seen = []
+    for speed in (25.0, 5.0):
+        numbers[layout["ball"].offsets["linear_velocity"] + 1] = speed
+        seen.append(len(reading(deployment, numbers).bodies))
+    assert seen == [14, 0]
+
+
+def test_bodies_beside_the_view_throw_shadows_into_it() -> None:
+    view = "at: {x: -80 cm, z: 40 cm, pitch: 90 deg}, fov: 10 deg"
     bare, shaded = (with_eye(f"kind: camera, {view}, shadows: {on}") for on in ("false", "true"))
     numbers = moved(bare)
-    assert len(reading(bare, numbers).links) < len(reading(shaded, numbers).links) == 8 * 17
+    assert len(reading(bare, numbers).bodies) < len(reading(shaded, numbers).bodies) == 8 + 8 * 3
 
 
 def test_a_camera_inside_of_a_body_draws() -> None:
@@ -154,12 +163,14 @@ def test_a_segmentation_has_names_and_kinds_of_pictures_are_those_of_the_camera(
         Sight(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, ()).image()
 
 
-@pytest.mark.parametrize("links", [(), (1e9, *UP), (0.5, *UP), (0.0,), (-1.0, *UP), (0.0, *[0.0] * 7)])
-def test_a_reading_that_the_network_has_changed_is_malformed(links: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    "bodies", [(), (1e9, *UP), (0.5, *UP), (0.0,), (-1.0, *UP), (0.0, *[0.0] * 7), (0.0, *UP, 1.0, 0.0)]
+)
+def test_a_reading_that_the_network_has_changed_is_malformed(bodies: tuple[float, ...]) -> None:
     codec = channel_codec(with_eye(f"kind: camera, noise: 1, {ABOVE}"), "camera", "eye")
     assert codec is not None
-    tick = 0.0 if links else 1e300
-    changed = codec.decode(codec.encode(Sight(tick, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, links)))
+    tick = 0.0 if bodies else 1e300
+    changed = codec.decode(codec.encode(Sight(tick, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, bodies)))
     with pytest.raises(Malformed):
         changed.image()
 
@@ -185,13 +196,22 @@ def test_settings_that_cannot_be_are_refused(settings: str) -> None:
     assert REFUSED[settings] in str(error.value).replace("robots.camera.sensors.", "")
 
 
-def test_more_moving_links_than_a_packet_takes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a table with ten balls 26 links may be in view."""
-    assert (NUMBERS_MAX // LINK, NUMBERS_MAX // LINK_BLURRED) == (511, 292)
-    monkeypatch.setattr(cameras, "NUMBERS_MAX", 25 * LINK)
-    what = "a packet takes 25 moving links, and all 26 of this world may be in view; fewer of them would help, 'rgbd'"
-    with pytest.raises(DeploymentError, match=what):
-        with_eye(f"kind: rgbd, {ABOVE}", "table.spare_balls=9")
+@pytest.mark.parametrize(
+    "kind", ["rgbd", "semantic_camera, tag: b", "laser_scanner_3d, rows: 1, columns: 2, range: 1 m"]
+)
+def test_settings_are_checked_before_the_files_of_the_scenery_are_read(kind: str) -> None:
+    with_eye(f"kind: {kind}", "scenery={wedge: {shape: mesh, file: wedge.obj}}")
+
+
+def test_more_moving_bodies_than_a_packet_takes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten balls have 80 numbers, 140 with an exposure, and 8 rods 24 or 40."""
+    monkeypatch.setattr(cameras, "NUMBERS_MAX", 104)
+    with_eye(f"kind: rgbd, width: 11, {ABOVE}", "table.spare_balls=9")
+    for most, blurred in ((103, ""), (179, ", exposure: 1 ms")):
+        monkeypatch.setattr(cameras, "NUMBERS_MAX", most)
+        what = f"takes {most} numbers, and all 18 moving bodies of this world, which may be in view, have {most + 1}; f"
+        with pytest.raises(DeploymentError, match=what):
+            with_eye(f"kind: rgbd, {ABOVE}{blurred}", "table.spare_balls=9")
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from foosim.world.components.entities import mounting_of
 from foosim.world.components.in_view import InView
 from foosim.world.components.mounted import Mounted
 from foosim.world.components.optics import Optics
-from foosim.world.components.sight import LINK, LINK_BLURRED, NUMBERS_MAX, Seen, Sight, looks_of
+from foosim.world.components.sight import NUMBERS_MAX, Seen, Sight, looks_of
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import IncompatibleComponent, Mounting, View
 from foosim.world.placing import FIRST_LINK, FIRST_LINK_OR_WORLD, Coordinate, MountedOrStanding
@@ -187,15 +187,15 @@ class Eye:
         around = Surroundings(at.spec, at.layout)
         self._mount: Mounted | None = None
         self._standing = where.position, where.orientation
-        if at.robot.name in around.scene.bodies:
+        if at.robot.name in around.bodies:
             self._mount = Mounted(at, where)
         elif where.link is not None:
             what = f"{at.robot.name} has no body, so its cameras are placed in the world's frame, without a link"
             raise IncompatibleComponent(("at", "link"), what, where.link)
         self._target, self._seen = settings.look_at, None
         if settings.look_at is not None and (name := settings.look_at.entity) is not None:
-            if name not in around.scene.bodies:
-                there = [*around.scene.bodies]
+            if name not in around.bodies:
+                there = [*around.bodies]
                 nearest = nearest_quoted(name, there)
                 raise IncompatibleComponent(("look_at", "entity"), "no entity with a body", name, nearest)
             self._seen = Mounted(mounting_of(at.spec, at.layout, at.layout[name]), FIRST_LINK)
@@ -239,7 +239,7 @@ def half_turn(c: float, s: float) -> tuple[float, float]:
 
 
 class PictureSensor(Sensor):
-    """A sensor that is drawn at its readers: its reading is its pose and those of the moving links in its view."""
+    """A sensor that is drawn at its readers: its reading is its pose and the moving bodies in its view."""
 
     reading: ClassVar[type[Seen]] = Sight
 
@@ -248,17 +248,18 @@ class PictureSensor(Sensor):
 
     @staticmethod
     def check(settings: Any, at: Mounting) -> None:
-        """Raise IncompatibleComponent for a pose that cannot be, or for more moving links than a packet takes."""
+        """Raise IncompatibleComponent for a pose that cannot be, or for more moving bodies than a packet takes."""
         Eye(at, settings)
-        is_blurred = settings.optics.exposure > 0.0
-        most = NUMBERS_MAX // (LINK_BLURRED if is_blurred else LINK)
-        count = sum([number >= 0 for looks in looks_of(at) for number in looks.numbers])
-        if count > most:
-            less = "fewer of them, or no exposure, would help" if is_blurred else "fewer of them would help"
-            what = f"a packet takes {most} moving links, and all {count} of this world may be in view; {less}"
-            raise IncompatibleComponent(("kind",), what, settings.kind)
+        exposure, bodies = settings.optics.exposure, looks_of(at)
+        count = len(bodies) + sum([end - first for looks in bodies for first, end in looks.runs(exposure)])
+        if count > NUMBERS_MAX:
+            less = "fewer of them, or no exposure, would help" if exposure else "fewer of them would help"
+            what = (
+                f"a packet takes {NUMBERS_MAX} numbers, and all {len(bodies)} moving bodies of this world, which may be"
+            )
+            raise IncompatibleComponent(("kind",), f"{what} in view, have {count}; {less}", settings.kind)
 
     def sample(self, view: View) -> Seen:
         place, turned = self._eye.pose(view.numbers)
         numbers = view.numbers if isinstance(view.numbers, list) else list(view.numbers)
-        return self.reading(float(view.tick), *place, *turned, tuple(self._in_view.links(numbers, place, turned)))
+        return self.reading(float(view.tick), *place, *turned, tuple(self._in_view.moving(numbers, place, turned)))

@@ -6,9 +6,10 @@ to the right.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from foosim.world.scene import MOVING, Scene
+from foosim.world.scene import MOVING, Body
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +34,13 @@ class Optics:
     gain: float = 1.0
 
 
-def moving_links(scene: Scene) -> list[tuple[str, int]]:
+def moving_links(bodies: Mapping[str, Body]) -> list[tuple[str, int]]:
     """Return the links whose pose is not constant, as (body, index of the link): by bodies in name order.
 
     The place in the list is the link's number in the readings of cameras.
     """
     found = []
-    for name, body in sorted(scene.bodies.items()):
+    for name, body in sorted(bodies.items()):
         moves: list[bool] = []
         for index, link in enumerate(body.links):
             moves.append(link.joint in MOVING or link.joint == "free" or (link.parent >= 0 and moves[link.parent]))

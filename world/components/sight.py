@@ -1,11 +1,12 @@
-"""What a camera sees: the reading of all cameras, and the moving links in their view.
+"""What a camera sees: the reading of all cameras, and the moving bodies of a scene.
 
 A picture is a pure function of a frame and is drawn where it is looked at: a reading carries the pose of the camera and
-those of the moving links in view, as float64, so that a picture drawn from a packet equals one drawn from the frame.
+numbers of the moving bodies in view, as float64, so that a picture drawn from a packet equals one drawn from the frame.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -18,8 +19,9 @@ from foosim.world.components.in_view import Looks
 from foosim.world.components.optics import moving_links
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting
-from foosim.world.layout import Layout
-from foosim.world.scene import Link, Scene, Vector, enclosing, moved, shape_box
+from foosim.world.kinematics import forward_kinematics
+from foosim.world.layout import Entity, Layout
+from foosim.world.scene import ORIGIN, Body, Link, Vector, dot, enclosing, moved, shape_box
 
 if TYPE_CHECKING:  # a client without pictures does without numpy
     import numpy as np
@@ -27,20 +29,16 @@ if TYPE_CHECKING:  # a client without pictures does without numpy
 
 PICTURES: Final = "foosim.rendering.pictures:Pictures"
 """What draws the pictures of cameras."""
-LINK: Final = 8
-"""Numbers of a link: its number, position and orientation."""
-LINK_BLURRED: Final = 14
-"""Those of a camera with an exposure: linear and angular velocity, too."""
 NUMBERS_MAX: Final = limits.PAYLOAD_BYTES_MAX // 8 - 8
-"""Numbers of links in a packet."""
+"""Numbers of bodies in a packet."""
 
 
 class Seen(Struct, frozen=True, dict=True):
     """What is around a sensor at a tick: the pose of the sensor, x ahead, y to the left, z up (m, world frame).
 
-    `links` are the moving links in view, each as its number (its place in `optics.moving_links`), the position (m) and
-    the orientation (x, y, z, w) of its frame in the world frame, and of a camera with an exposure its linear and
-    angular velocity (m/s, rad/s).
+    `bodies` are the moving bodies in view, each as its number (its place in `moving_bodies`) and numbers of its state:
+    position (m) and orientation (x, y, z, w) of a free one, positions of joints (m, rad), and of a camera with an
+    exposure the velocities of these (m/s, rad/s).
     """
 
     tick: Count
@@ -51,7 +49,7 @@ class Seen(Struct, frozen=True, dict=True):
     qy: QuaternionPart
     qz: QuaternionPart
     qw: QuaternionPart
-    links: Annotated[tuple[float, ...], Meta(max_length=NUMBERS_MAX)]
+    bodies: Annotated[tuple[float, ...], Meta(max_length=NUMBERS_MAX)]
 
     @property
     def _drawn_by(self) -> Any:
@@ -97,19 +95,34 @@ class Sight(Seen, frozen=True, dict=True):
 
 
 def looks_of(at: Mounting) -> list[Looks]:
-    """Return the bodies with moving links that look like something, which all cameras of a layout share."""
-    scene = Surroundings(at.spec, at.layout).scene
-    return at.layout.shared("looks", at.spec, lambda: _looks(scene, at.layout))
+    """Return the moving bodies of a layout, which all its cameras share."""
+    bodies = Surroundings(at.spec, at.layout).bodies
+    return at.layout.shared("looks", at.spec, lambda: moving_bodies(bodies, at.layout))
 
 
-def _looks(scene: Scene, layout: Layout) -> list[Looks]:
-    found: dict[str, Looks] = {}
-    for number, (name, index) in enumerate(moving_links(scene)):
-        body = scene.bodies[name]
-        if sphere := sphere_of(body.links[index]):
-            its = found.setdefault(name, Looks(body, layout[name]))
-            its.numbers[index], (its.middles[index], its.radii[index]) = number, sphere
-    return [*found.values()]
+def moving_bodies(bodies: Mapping[str, Body], layout: Layout) -> list[Looks]:
+    """Return the bodies with moving links that look like something, in name order."""
+    links: dict[str, list[tuple[int, int]]] = {}
+    for number, (name, index) in enumerate(moving_links(bodies)):
+        if sphere_of(bodies[name].links[index]):
+            links.setdefault(name, []).append((index, number))
+    return [_looks(bodies[name], layout[name], its) for name, its in links.items()]
+
+
+def _looks(body: Body, entity: Entity, links: list[tuple[int, int]]) -> Looks:
+    """Return a body, whose links are nowhere farther from its place than along the chain to them."""
+    origins = [at for _, at, _ in forward_kinematics(body, entity, [0.0] * entity.stop)]
+    place, radius = origins[0], 0.0
+    ways: list[float] = []
+    for index, link in enumerate(body.links):
+        arm = link.position if link.parent >= 0 else moved(origins[index], place, -1.0)
+        if index == 0 and body.is_free:
+            arm = link.centre_of_mass
+        ways.append((ways[link.parent] if link.parent >= 0 else 0.0) + sqrt(dot(arm, arm)))
+    for index, _ in links:
+        middle, its = sphere_of(body.links[index]) or (ORIGIN, 0.0)
+        radius = max(radius, ways[index] + sqrt(dot(middle, middle)) + its)
+    return Looks(body, entity, place, radius, links)
 
 
 def sphere_of(link: Link) -> tuple[Vector, float] | None:

@@ -91,9 +91,18 @@ class Surroundings:
         """The bodies of the layout and the scenery, which all components of it share."""
         return self._layout.shared("scene", self._spec, self._made_scene)
 
+    @property
+    def bodies(self) -> dict[str, Body]:
+        """The bodies of the layout by name, which all components of it share; they need no file of the scenery."""
+        found = self._layout.shared("bodies", self._spec, self._made_bodies)
+        assert isinstance(found, dict)
+        return found
+
+    def _made_bodies(self) -> dict[str, Body]:
+        return {entity.name: body for entity in self._layout.entities if (body := self._body(entity)) is not None}
+
     def _made_scene(self) -> Scene:
-        bodies = {entity.name: body for entity in self._layout.entities if (body := self._body(entity)) is not None}
-        return Scene(bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
+        return Scene(self.bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
 
     @staticmethod
     def contacts(view: View, entity: Entity) -> Contacts:
