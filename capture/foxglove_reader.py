@@ -1,6 +1,6 @@
 """What viewers look at, read back from a capture: poses, lines of the log, and scenes with other names.
 
-The library that writes such messages reads none: their classes are made of the schemas that it has.
+The library that writes such messages reads none: their classes follow from the schemas that it has.
 """
 
 from __future__ import annotations

@@ -10,13 +10,14 @@ from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.library.mobile.differential_drive import WHEELS, WheeledMotion
 from foosim.library.mobile.hall_settings import Place, hall_of
-from foosim.library.mobile.vehicles import ROUNDING, body_of
+from foosim.library.mobile.vehicles import body_of
 from foosim.library.mobile.wheels import Wheels, slips_of
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
+from foosim.world.moving.free_way import ROUNDING
 from foosim.world.moving.upright import Upright
 from foosim.world.scene import Body, Colour, turn
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
 from foosim.library.mobile.hall_settings import Place, hall_of
@@ -10,7 +9,6 @@ from foosim.library.mobile.vehicles import mast
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
-from foosim.world.components.view import WritableView
 from foosim.world.matter.materials import METAL
 from foosim.world.scene import ORIGIN, Body, Colour, Cylinder, Link, Shape
 
@@ -26,7 +24,7 @@ class StationRobot(RobotSettings):
 
 @model("station", StationRobot, slots={"down": 1, "refused": 1}, kit="hall")
 class Station(Model):
-    """A base station: a round hull with an antenna."""
+    """A base station: a round hull with an antenna, which stands at the place of its settings."""
 
     def body(self) -> Body:
         """Return the hull and the mast of its antenna."""
@@ -37,10 +35,3 @@ class Station(Model):
         link = Link(name, "fixed", shapes, 0.0, ORIGIN)
         place = (self.settings.x, self.settings.y, 0.0)
         return Body(name, "station", place, (link,), (0.0, 0.0, station.antenna_height))
-
-    def place(self, view: WritableView) -> None:
-        """It stands at the place of its settings."""
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Nothing moves it."""
-        return True

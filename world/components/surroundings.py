@@ -94,9 +94,7 @@ class Surroundings:
     @property
     def bodies(self) -> dict[str, Body]:
         """The bodies of the layout by name, which all components of it share; they need no file of the scenery."""
-        found = self._layout.shared("bodies", self._spec, self._made_bodies)
-        assert isinstance(found, dict)
-        return found
+        return self._layout.shared("bodies", self._spec, self._made_bodies)
 
     def _made_bodies(self) -> dict[str, Body]:
         return {entity.name: body for entity in self._layout.entities if (body := self._body(entity)) is not None}
