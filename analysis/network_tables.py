@@ -27,16 +27,18 @@ def summary_tables(summaries: Sequence[LinkSummary]) -> list[Table]:
         losses.add_row(
             summary.name, summary.medium, links, loss_text(summary), burst_text(summary), delay_text(summary)
         )
-        for number, carried in enumerate(summary.carried):
-            first, queue_ns = number == 0, summary.queue_ns
+        sizes = [(summary.name, summary.rate_bps, one) for one in summary.carried]
+        sizes += [("broadcasts", summary.broadcast_bps, one) for one in summary.broadcast if summary.broadcast_bps]
+        for number, (name, rate_bps, carried) in enumerate(sizes):
+            first, queue_ns = carried.size == summary.carried[0].size, summary.queue_ns if number == 0 else None
             media.add_row(
-                summary.name if first else "",
-                rate_text(summary.rate_bps or 0) if first else "",
+                name if first else "",
+                rate_text(rate_bps or 0) if first else "",
                 str(carried.size),
                 time_text(carried.airtime_ns),
                 rate_text(carried.goodput_bps),
                 "-" if carried.shared_bps is None else rate_text(carried.shared_bps),
-                time_text(queue_ns) if first and queue_ns is not None else "",
+                time_text(queue_ns) if queue_ns is not None else "",
             )
         if summary.range_los_m is not None:
             ranges = range_text(summary.range_los_m), range_text(summary.range_nlos_m)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from shutil import rmtree
 
 from foosim.common.errors import BadValue, Failed, Refused
 
@@ -37,7 +38,7 @@ def check_absent(out: Path) -> None:
 
 @contextmanager
 def new_file(out: Path) -> Iterator[Path]:
-    """Give the name to write to; the file gets its own name, `out`, when it is whole.
+    """Give the name to write to; the file, or the folder made there, gets its own name, `out`, when it is whole.
 
     Raises Existing, and Failed when it cannot be written.
     """
@@ -57,6 +58,7 @@ def written(out: Path) -> Iterator[Path]:
     except OSError as error:
         raise _failed(out, error) from None
     finally:
+        rmtree(part, ignore_errors=True)
         with suppress(OSError):
             part.unlink(missing_ok=True)
 

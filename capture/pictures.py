@@ -11,6 +11,7 @@ import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from fnmatch import fnmatchcase
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -25,6 +26,7 @@ from foosim.capture.new_file import check_absent, new_file
 from foosim.capture.reader import CaptureData, open_capture
 from foosim.capture.rows import PACKETS, PacketRow
 from foosim.common.errors import BadValue, Failed
+from foosim.common.units import format_ns
 from foosim.rendering.cameras import OVERVIEW, Camera, Overview, cameras_of
 from foosim.rendering.png import encode_png
 from foosim.rendering.view import focal_length
@@ -67,7 +69,7 @@ def export_pictures(
     if form == "video" and list(cameras) == [OVERVIEW]:
         return _overview(capture, out, span_ns)
     chosen = _chosen(capture, cameras)
-    found = pictures_of(capture, chosen, span_ns, again)
+    found = _some(pictures_of(capture, chosen, span_ns, again), capture, span_ns)
     if form == "video":
         if len(chosen) != 1:
             raise BadValue(
@@ -124,23 +126,31 @@ def _ticks(capture: CaptureData, span_ns: tuple[int, int | None]) -> tuple[int, 
     return -(-span_ns[0] // tick_ns), float("inf") if span_ns[1] is None else span_ns[1] // tick_ns
 
 
+def _some(pictures: Iterator[Any], capture: CaptureData, span_ns: tuple[int, int | None]) -> Iterator[Any]:
+    """Return the pictures. Raises BadValue where there is none."""
+    for first in pictures:
+        return chain([first], pictures)
+    begin, end = (format_ns(int(tick) * capture.deployment.tick_ns) for tick in (capture.ticks[0], capture.ticks[-1]))
+    to = "the end" if span_ns[1] is None else format_ns(span_ns[1])
+    what = f"no camera has a picture in this span; the capture has {begin} to {end}"
+    raise BadValue(what, f"{format_ns(span_ns[0])} to {to}")
+
+
 # --- PNG -------------------------------------------------------------------------------------------------------------
 
 
 def _png_files(out: Path, pictures: Iterable[Picture]) -> int:
     count = 0
-    try:
-        out.mkdir(parents=True)
+    with new_file(out) as part:
+        part.mkdir(parents=True)
         for camera, tick, sight in pictures:
             for kind in camera.settings.pictures:
                 pixels = sight.picture(kind)
                 if kind == "depth":
                     pixels = np.minimum(np.rint(pixels * np.float32(1000.0)), DEPTH_MM_MAX)
                 name = f"{camera.robot}.{camera.channel}.{kind}.{tick:09d}.png"
-                (out / name).write_bytes(encode_png(pixels))
+                (part / name).write_bytes(encode_png(pixels))
                 count += 1
-    except OSError as error:
-        raise Failed(f"{out}: cannot be written, {error.strerror or error}") from None
     return count
 
 
@@ -217,7 +227,8 @@ def _overview(capture: CaptureData, out: Path, span_ns: tuple[int, int | None]) 
     frames = (
         view.at(frame.tick, frame.numbers).image() for frame in capture.each_frame() if first <= frame.tick <= last
     )
-    return _video(out, frames, *OVERVIEW_PIXELS, 1e9 / (deployment.capture.frames_every * deployment.tick_ns))
+    rate_hz = 1e9 / (deployment.capture.frames_every * deployment.tick_ns)
+    return _video(out, _some(frames, capture, span_ns), *OVERVIEW_PIXELS, rate_hz)
 
 
 def _video(out: Path, frames: Iterable[NDArray[np.uint8]], width: int, height: int, rate_hz: float) -> int:

@@ -13,11 +13,12 @@ import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, get_origin
 
 from foosim.common.errors import DeploymentError, describe, show
 from foosim.common.names import nearest_name
-from foosim.deployment.schema import Deployment
+from foosim.deployment.network.rules import Network
+from foosim.deployment.schema import Deployment, Player
 from foosim.deployment.text.expand import Expansion
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.templates import TEMPLATES
@@ -33,10 +34,18 @@ from foosim.deployment.text.yaml import (
     plain,
     read_tree,
 )
+from foosim.world.component_types.settings import RobotSettings
 
 ENTRIES_SHOWN_MAX: Final = 8
 SETS_MAX: Final = 256
 SET_LENGTH_MAX: Final = 4096
+NAMED: Final = {TEMPLATES} | {
+    key
+    for section in (Deployment, Player, Network, RobotSettings)
+    for key, field in section.model_fields.items()
+    if get_origin(field.annotation) is dict
+}
+"""The sections whose keys are names."""
 
 _STEP = re.compile(r'(?:"(?P<quoted>[^"]*)"|(?P<plain>[^".=\[\]]+))')
 _INDEX = re.compile(r"\[(?P<index>[0-9]+)\]")
@@ -204,8 +213,8 @@ def _key(keys: Collection[str], steps: Sequence[tuple[str, int]], index: int) ->
 
 
 def _open(taken: _Taken, node: Fields, key: str, steps: Sequence[tuple[str, int]], index: int, number: int) -> None:
-    """Add the value that a key on the way has by a template or a count, or an empty mapping for a section that the file
-    leaves out; any other missing key on the way is an error."""
+    """Add the value that a key on the way has by a template or a count, or an empty mapping for a section that is left
+    out, which is checked with the file; a missing name on the way is an error."""
     place = _place(number, steps[index][1])
     names = taken.names()
     if key in names:
@@ -213,7 +222,7 @@ def _open(taken: _Taken, node: Fields, key: str, steps: Sequence[tuple[str, int]
         node.keys[key] = place
         node.values[key] = Fields(place) if there is None or isinstance(there, Fields) else copied(there)
         return
-    if node is taken.tree and (key in Deployment.model_fields or key == TEMPLATES):
+    if taken.steps[-1] not in NAMED if taken.steps else key in Deployment.model_fields or key == TEMPLATES:
         node.keys[key], node.values[key] = place, Fields(place)
         return
     nearest = None

@@ -21,7 +21,7 @@ from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, Unknown
 from foosim.common.finding import Finding, Location
 from foosim.common.keyed_random import draw_key
 from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
-from foosim.common.spec_base import RATE_MIN
+from foosim.common.spec_base import RATE_MIN, SpecBase
 from foosim.common.units import format_ns, format_rate
 from foosim.deployment.schema import Deployment, Player
 from foosim.deployment.schema_errors import settings_findings
@@ -525,6 +525,8 @@ def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     once.
     """
     kits = deployment.kits
+    tagged: list[Any] = [*deployment.robots.values(), *deployment.objects.values(), *_models(deployment)]
+    tags = {tag for entity in tagged for tag in entity.tags}
     met: set[tuple[int, int]] = set()
     for section, entities in (("robots", deployment.robots), ("objects", deployment.objects)):
         for name, entity in entities.items():
@@ -546,12 +548,24 @@ def needs(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                     found = settings.component_type
                     for what in [*_needs_kit(found, kits)] or _component_problems(found, model, having):
                         yield Finding((*place, of, label, "kind"), what, settings.kind)
+                    yield from _unknown_tags(settings, (*place, of, label), tags)
     for label, rule in deployment.rules.items():
         for what in (*_needs_kit(rule.component_type, kits), *_rule_problems(rule.component_type)):
             yield Finding(("rules", label, "kind"), what, rule.kind)
+        yield from _unknown_tags(rule, ("rules", label), tags)
     if deployment.scene is not None:
         for what in _needs_kit(deployment.scene.component_type, kits):
             yield Finding(("scene", "kind"), what, deployment.scene.kind)
+
+
+def _unknown_tags(settings: SpecBase | list[Any], place: Location, tags: Collection[str]) -> Iterator[Finding]:
+    """Yield the settings `tag` of a component or rule, also in lists of it, with a tag of no entity."""
+    for key, value in settings if isinstance(settings, SpecBase) else enumerate(settings):
+        if isinstance(value, SpecBase | list):
+            yield from _unknown_tags(value, (*place, key), tags)
+        elif key == "tag" and value is not None and value not in tags:
+            error = UnknownName("a tag that no entity has", value, sorted(tags))
+            yield Finding((*place, key), error.problem, value, error.nearest)
 
 
 def _components_of(entity: EntitySettings) -> Iterator[tuple[str, str, ComponentSettings]]:

@@ -90,10 +90,11 @@ static int clip(Corner *polygon, double near) {
 
 static void draw(const Band *band, double height, double near, const Corner *all, const int32_t *corners, int both,
                  int32_t number) {
-    Corner p[CLIPPED] = {all[corners[0]], all[corners[1]], all[corners[2]]};
+    Corner p[CLIPPED];
     double width = (double)band->width;
     int is_plain = 1, count = 3, low = 15, right = 1, below = 1;
     for (int i = 0; i < 3; i++) {
+        p[i] = all[corners[i]];
         double guard = GUARD * p[i].w;
         is_plain &= p[i].w >= near && p[i].x >= -guard && p[i].x <= guard && p[i].y >= -guard && p[i].y <= guard;
         low &= (p[i].w < near) | (p[i].x < 0.0) << 1 | (p[i].y < 0.0) << 2;
@@ -122,7 +123,14 @@ static PyObject *raster(PyObject *Py_UNUSED(self), PyObject *args) {
         return NULL;
     const double *v = world.buf, *m = matrix.buf;
     const int32_t *t = triangles.buf, *range = ranges.buf;
-    Corner *all = malloc((size_t)(world.len / 24 + 1) * sizeof(Corner));
+    Py_ssize_t bytes = width * height * 4; /* Each triangle has corners of its model: they are not counted. */
+    int fits = matrix.len == 128 && first >= 0 && end <= height && ranges.len % 20 == 0 && nearness.len == bytes &&
+               numbers.len == bytes;
+    for (Py_ssize_t k = 0; k < ranges.len / 20; k++) {
+        const int32_t *run = range + 5 * k;
+        fits = fits && run[0] >= 0 && run[1] <= world.len / 24 && run[2] >= 0 && run[3] <= triangles.len / 12;
+    }
+    Corner *all = fits ? malloc((size_t)(world.len / 24 + 1) * sizeof(Corner)) : NULL;
     if (all) {
         Py_BEGIN_ALLOW_THREADS
         Band band = {width, first, end, nearness.buf, numbers.buf};
@@ -139,6 +147,7 @@ static PyObject *raster(PyObject *Py_UNUSED(self), PyObject *args) {
     free(all);
     PyBuffer_Release(&world), PyBuffer_Release(&triangles), PyBuffer_Release(&ranges), PyBuffer_Release(&matrix);
     PyBuffer_Release(&nearness), PyBuffer_Release(&numbers);
+    if (!fits) return PyErr_Format(PyExc_ValueError, "sizes of arrays do not fit together");
     if (!all) return PyErr_NoMemory();
     Py_RETURN_NONE;
 }

@@ -23,7 +23,8 @@ NONE: Final = -1
 """The number where no triangle is."""
 GUARD: Final = 1048576.0
 """Pixels about the picture beyond which triangles are clipped: products of integers stay below 2^63."""
-PIXELS_AT_ONCE: Final = 1 << 20
+PIXELS_AT_ONCE: Final = 1 << 15
+"""Their arrays stay in a cache."""
 
 
 def raster(

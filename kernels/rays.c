@@ -323,6 +323,21 @@ static int cast_all(Shapes *shapes, int64_t count, const double *origins, const 
     return is_done;
 }
 
+/* Whether arrays, in the order of first_hits, fit together: sizes, forms and meshes of shapes, rays of bundles. */
+static int fit(const Py_buffer *in, Py_ssize_t meshes, int64_t rays) {
+    int64_t shapes = in[1].len / 8, bundles = in[7].len / 8, *forms = in[3].buf, *mesh = in[5].buf;
+    const int64_t *starts = in[9].buf, *lengths = in[10].buf;
+    const int64_t counts[12] = {15 * shapes, shapes,  3 * shapes, shapes,  shapes,  shapes,
+                                3 * bundles, bundles, bundles,    bundles, bundles, 3 * rays};
+    int fits = 1;
+    for (int i = 0; i < 12; i++) fits = fits && in[i].len == counts[i] * 8;
+    for (int64_t n = 0; fits && n < shapes; n++)
+        fits = forms[n] >= BOX && forms[n] <= CAPSULE && mesh[n] >= -(forms[n] != MESH) && mesh[n] < meshes;
+    for (int64_t b = 0; fits && b < bundles; b++)
+        fits = starts[b] >= 0 && lengths[b] >= 0 && lengths[b] <= rays - starts[b];
+    return fits;
+}
+
 /* first_hits(columns, radii, half, forms, things, mesh numbers, ((boxes, corners, is closed), ...), origins, ranges,
 passed, starts, lengths, ways, distances, things or None) */
 static PyObject *first_hits(PyObject *Py_UNUSED(self), PyObject *arguments) {
@@ -334,7 +349,7 @@ static PyObject *first_hits(PyObject *Py_UNUSED(self), PyObject *arguments) {
     Py_ssize_t count = PyTuple_Size(meshes), parsed = 0;
     Mesh *mesh = calloc((size_t)count + 1, sizeof *mesh);
     Py_buffer *held = calloc(2 * (size_t)count + 1, sizeof *held);
-    int is_done = mesh && held && (named_in == Py_None || PyObject_GetBuffer(named_in, &named, PyBUF_WRITABLE) == 0);
+    int fits = 1, is_done = mesh && held && (named_in == Py_None || PyObject_GetBuffer(named_in, &named, PyBUF_WRITABLE) == 0);
     if (!mesh || !held) PyErr_NoMemory();
     for (; is_done && parsed < count; parsed++) {
         Py_buffer *boxes = held + 2 * parsed;
@@ -344,6 +359,11 @@ static PyObject *first_hits(PyObject *Py_UNUSED(self), PyObject *arguments) {
         }
         mesh[parsed].boxes = boxes->buf, mesh[parsed].corners = boxes[1].buf;
         mesh[parsed].blocks = boxes->len / (Py_ssize_t)(6 * sizeof(double));
+        fits = fits && boxes[1].len == mesh[parsed].blocks * BLOCK * 72;
+    }
+    if (is_done && !(fits && out.len % 8 == 0 && (!named.obj || named.len == out.len) && fit(in, count, out.len / 8))) {
+        PyErr_Format(PyExc_ValueError, "sizes of arrays do not fit together");
+        is_done = 0;
     }
     if (is_done) {
         Shapes shapes = {in[1].len / (Py_ssize_t)sizeof(double), in[0].buf, in[1].buf, in[2].buf, in[3].buf,
@@ -371,7 +391,8 @@ static PyObject *turned(PyObject *Py_UNUSED(self), PyObject *arguments) {
     int64_t all = directions.len / (Py_ssize_t)(3 * sizeof(double)), rays = count ? all / count : 0;
     const double *q = orientations.buf, *in = directions.buf;
     double *out = ways.buf;
-    for (int64_t n = 0; n < count; n++) {
+    int fits = orientations.len == 32 * count && directions.len == 24 * all && ways.len == 24 * all && all == count * rays;
+    for (int64_t n = 0; fits && n < count; n++) {
         double qx = q[n], qy = q[count + n], qz = q[2 * count + n], qw = q[3 * count + n];
         for (int64_t k = n * rays; k < (n + 1) * rays; k++) {
             double x = in[3 * k], y = in[3 * k + 1], z = in[3 * k + 2];
@@ -382,5 +403,6 @@ static PyObject *turned(PyObject *Py_UNUSED(self), PyObject *arguments) {
         }
     }
     PyBuffer_Release(&orientations), PyBuffer_Release(&directions), PyBuffer_Release(&ways);
+    if (!fits) return PyErr_Format(PyExc_ValueError, "sizes of arrays do not fit together");
     Py_RETURN_NONE;
 }

@@ -23,18 +23,7 @@ from foosim.world.components.sight import Sight, looks_of
 from foosim.world.components.view import View
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
-from foosim.world.scene import (
-    ORIGIN,
-    Quaternion,
-    Vector,
-    conjugate,
-    drawn,
-    enclosing,
-    moved,
-    rotate,
-    shape_box,
-    swept_box,
-)
+from foosim.world.scene import Quaternion, Vector, conjugate, drawn, enclosing, moved, rotate, shape_box, swept_box
 from foosim.world.spec import WorldSpec
 
 OVERVIEW: Final = "overview"
@@ -42,7 +31,6 @@ FROM: Final[Vector] = (-0.36, -0.48, 0.8)
 """The direction from the middle of the world to the eye of an overview, of length 1."""
 FAR: Final = 4.0
 """How far an overview sees, in its distances from the middle."""
-ABOVE: Final = "view from above"
 FOV_ABOVE: Final = 0.6
 UP: Final[Vector] = (0.0, 0.0, 1.0)
 DOWN: Final[Quaternion] = (-0.5, 0.5, 0.5, 0.5)
@@ -97,17 +85,17 @@ class Overview:
 
     def __init__(self, spec: WorldSpec, layout: Layout, width: int, height: int, *, is_above: bool = False) -> None:
         """Raises AssetError without a mesh of the world."""
-        name, fov, way, self._turned = OVERVIEW, DEFAULT_FOV, FROM, towards(moved(ORIGIN, FROM, -1.0))
+        fov, way, self._turned = DEFAULT_FOV, FROM, towards(moved((0.0, 0.0, 0.0), FROM, -1.0))
         if is_above:
-            name, fov, way, self._turned = ABOVE, FOV_ABOVE, UP, DOWN
-        low, high = _shown(spec, layout, name)
+            fov, way, self._turned = FOV_ABOVE, UP, DOWN
+        low, high = _shown(spec, layout)
         middle = moved(moved(low, low, -0.5), high, 0.5)
         corners = product((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
         seen = [rotate(conjugate(self._turned), moved(corner, middle, -1.0)) for corner in corners]
         away = max([max(abs(y), abs(z) * width / height) / tan(fov / 2.0) - x for x, y, z in seen])
         self._eye = moved(middle, way, away)
         optics = Optics(width, height, fov, 0.01 * away, FAR * away, samples=2)
-        self.pictures: Final = Pictures(spec, PictureSource(optics, ("image",), name), name, name)
+        self.pictures: Final = Pictures(spec, PictureSource(optics, ("image",), OVERVIEW), OVERVIEW, OVERVIEW)
         self._in_view = InView(optics, looks_of(mounting_of(spec, layout, layout.entities[0])))
 
     def at(self, tick: int, numbers: Sequence[float]) -> Sight:
@@ -118,22 +106,16 @@ class Overview:
         return sight
 
 
-def _shown(spec: WorldSpec, layout: Layout, name: str) -> tuple[Vector, Vector]:
-    """Return the box around what an overview shows: scenery above the ground and bodies where they begin, else 10 m.
-
-    From above, scenery that stands shows where bodies on fixed bases are.
-    """
-    scene, numbers = drawn_world(spec, name).scene, initial_numbers(spec, layout)
+def _shown(spec: WorldSpec, layout: Layout) -> tuple[Vector, Vector]:
+    """Return the box around scenery above the ground, else bodies on fixed bases, and free bodies at the beginning."""
+    scene, numbers = drawn_world(spec, OVERVIEW).scene, initial_numbers(spec, layout)
     boxes = [box for shape in drawn(scene.scenery) if (box := shape_box(shape))[1][2] > GROUND_M]
-    are_fixed_shown = name == OVERVIEW or not boxes
-    for body in scene.bodies.values():
+    bodies = [body for body in scene.bodies.values() if any(link.shapes for link in body.links)]
+    boxes = boxes or [swept_box(body) for body in bodies if not body.is_free]
+    for body in bodies:
         entity = layout[body.name]
-        if not any(link.shapes for link in body.links) or entity.is_absent(numbers):
-            continue
-        if body.is_free:
+        if body.is_free and not entity.is_absent(numbers):
             base = forward_kinematics(body, entity, numbers)[0][1]
             low, high = swept_box(body)
             boxes.append((moved(low, base, 1.0), moved(high, base, 1.0)))
-        elif are_fixed_shown:
-            boxes.append(swept_box(body))
     return enclosing(boxes or [((-5.0, -5.0, 0.0), (5.0, 5.0, 0.0))])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from itertools import product
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foosim.kernels.raster import NONE, Floats, Ints, raster
 from foosim.rendering.lens import lens_of, sensed
-from foosim.rendering.light import Floats32, coloured, facing_at, sky
+from foosim.rendering.light import Floats32, Picture, coloured, facing_at, sky
 from foosim.rendering.model import Model, advanced, check_poses
 from foosim.rendering.shadow import hidden, sun_over
 from foosim.rendering.view import View, focal_length, in_view, view_of
@@ -21,9 +22,11 @@ SUBFRAMES: Final = 9
 """Of an exposure: the last one, at the time of the poses, gives depth and segmentation."""
 PIXELS_AT_ONCE: Final = 1 << 16
 """Shaded at once, so that their arrays stay in a cache."""
+LOOKED_UP_AT_ONCE: Final = 1 << 13
+"""numpy makes indices of them, and would take new memory for more."""
 KEPT_PIXELS: Final = 1 << 22
 KEPT_VIEWS: Final = 32
-"""Of what stands, whose pictures are kept for cameras that stand."""
+"""Of what stands, whose pictures are kept for cameras that stand, from their second picture on."""
 
 
 class Drawn(NamedTuple):
@@ -37,7 +40,8 @@ class Drawn(NamedTuple):
 
 
 class _Buffers(NamedTuple):
-    """The nearness, the triangle and the colour (red, green, blue, one unused) of each pixel."""
+    """The nearness, the triangle and the colour of each pixel: red, green, blue, and whether the colour is that of a
+    curved triangle as if it were flat."""
 
     nearness: NDArray[np.float32]
     numbers: NDArray[np.int32]
@@ -59,7 +63,10 @@ class Drawer:
         self._facing = np.zeros(len(model.triangles) + 1, np.float32)
         self._flat = coloured(model.colours, self._facing)
         self._light(np.arange(len(model.triangles)))
-        self._kept: dict[View, _Buffers] = {}
+        self._thing = model.thing + np.int32(1)
+        self._kept: dict[View, _Buffers | None] = {}
+        self._buffers: dict[bool, _Buffers] = {}
+        """Those of the last view, and of the last one from the sun: new memory is half of the time of a picture."""
 
     def draw(
         self,
@@ -85,23 +92,30 @@ class Drawer:
         count = SUBFRAMES if optics.exposure > 0.0 and speeds.any() else 1
         lens = lens_of(optics) if any(optics.distortion) else None
         margin = (0, 0) if lens is None else lens.margin
-        total = np.zeros((optics.height + 2 * margin[1], optics.width + 2 * margin[0], 3), np.uint16)
         n = optics.samples
+        is_mean = n * count > 1
+        shape = optics.height + 2 * margin[1], optics.width + 2 * margin[0], 3
+        colour = np.zeros(shape, np.uint16 if is_mean else np.uint8)
         focal = focal_length(optics.fov, optics.width) * n
-        view = view_of(position, orientation, focal, total.shape[1] * n, total.shape[0] * n, optics.near, optics.far)
+        view = view_of(position, orientation, focal, shape[1] * n, shape[0] * n, optics.near, optics.far)
         for earlier in range(1 - count, 1):
             moved = advanced(poses, speeds, earlier * optics.exposure / count)
             frame = self._frame(view, optics, numbers, moved)
-            for i in range(n * n if n * count > 1 else 0):
-                total += frame.colour[i // n :: n, i % n :: n, :3]
-        colour = np.ascontiguousarray(frame.colour[:, :, :3])
-        if n * count > 1:
-            colour = ((total + np.uint16(n * n * count // 2)) // np.uint16(n * n * count)).astype(np.uint8)
+            for i, channel in product(range(n * n), range(3)):  # all channels at once would take three times as long
+                colour[:, :, channel] += frame.colour[i // n :: n, i % n :: n, channel]
+        if is_mean:
+            colour = ((colour + np.uint16(n * n * count // 2)) // np.uint16(n * n * count)).astype(np.uint8)
         nearness, triangles = frame.nearness[n // 2 :: n, n // 2 :: n], frame.numbers[n // 2 :: n, n // 2 :: n]
         if lens is not None:
-            colour, nearness, triangles = lens.mixed(colour), lens.nearest(nearness, 0), lens.nearest(triangles, NONE)
-        depth = np.divide(np.float32(1.0), nearness, out=np.zeros_like(nearness), where=triangles != NONE)
-        things = self._model.thing.take(triangles, mode="wrap") + np.int32(1)
+            colour, nearness, triangles = (
+                lens.mixed(colour),
+                lens.nearest(nearness, view.start),
+                lens.nearest(triangles, NONE),
+            )
+        depth, things = np.empty((2, *triangles.shape), np.float32)
+        np.divide(np.float32(1.0), nearness, out=depth)
+        np.copyto(depth, np.float32(0.0), where=triangles == NONE)
+        things = _looked_up(self._thing, triangles, things.view(np.int32))
         drawn = Drawn(sensed(colour, optics.gain, optics.noise, key), depth, things)
         for picture in drawn:
             picture.setflags(write=False)  # readers of one process share it
@@ -110,7 +124,9 @@ class Drawer:
     def _light(self, triangles: Ints) -> None:
         """Give triangles the facing and the colours that they have where they are flat."""
         self._facing[triangles] = self._model.facing[self._model.triangles[triangles, 0]]
-        self._flat[triangles] = coloured(self._model.colours[triangles], self._facing[triangles])
+        flat = coloured(self._model.colours.take(triangles, axis=0), self._facing[triangles])
+        flat[:, 3] = self._model.curved[triangles]
+        self._flat[triangles] = flat
 
     def _frame(self, view: View, optics: Optics, numbers: NDArray[np.intp], poses: Floats) -> _Buffers:
         """Return the picture of a view."""
@@ -123,36 +139,59 @@ class Drawer:
             seen = np.flatnonzero(buffers.numbers != NONE)
             for start in range(0, len(seen), PIXELS_AT_ONCE):
                 self._shadow(view, seen[start : start + PIXELS_AT_ONCE], buffers, sun, shadows)
+        if still is None or optics.shadows:
             return buffers
         pixels = np.flatnonzero(buffers.numbers != still.numbers)
         triangles = buffers.numbers.reshape(-1)[pixels]
-        buffers.colour.reshape(-1, 4).view(np.uint32)[pixels] = self._flat.view(np.uint32)[triangles]
+        _words(buffers.colour)[pixels] = _words(self._flat)[triangles]
         self._curve(view, pixels[self._model.curved[triangles]], buffers)
         return buffers
 
-    def _drawn(self, view: View, parts: Ints) -> tuple[_Buffers, _Buffers]:
-        """Return the picture of what stands, which is kept, and a copy with moving parts, not yet coloured."""
-        still = self._kept.pop(view, None) or self._standing(view)
+    def _drawn(self, view: View, parts: Ints) -> tuple[_Buffers | None, _Buffers]:
+        """Return the picture of what stands, of a view that was drawn before, and a copy with moving parts, not yet
+        coloured; of a new view the picture of all."""
+        standing = np.arange(self._model.standing)
+        is_new, still = view not in self._kept, self._kept.pop(view, None)
+        if still is None and not is_new:
+            still = self._picture(view, standing).copy()
         self._kept[view] = still
-        while len(self._kept) > KEPT_VIEWS or sum([view.width * view.height for view in self._kept]) > KEPT_PIXELS:
-            del self._kept[next(iter(self._kept))]
-        buffers = still.copy()
+        pixels = [one.width * one.height if kept else 0 for one, kept in self._kept.items()]
+        while len(self._kept) > KEPT_VIEWS or sum(pixels) > KEPT_PIXELS:
+            del self._kept[next(iter(self._kept))], pixels[0]
+        if still is None:
+            return None, self._picture(view, np.append(standing, parts))
+        buffers = self._taken(view)
+        np.copyto(buffers.nearness, still.nearness)
+        np.copyto(buffers.numbers, still.numbers)
+        np.copyto(buffers.colour, still.colour)
         self._raster(view, parts, buffers)
         return still, buffers
 
-    def _standing(self, view: View) -> _Buffers:
-        """Return the picture of what stands; one from the sun has no colours."""
-        shape = view.height, view.width
-        nearness, numbers = np.full(shape, view.start, np.float32), np.full(shape, NONE, np.int32)
-        buffers = _Buffers(nearness, numbers, np.zeros((0, 4), np.uint8))
-        self._raster(view, np.arange(self._model.standing), buffers)
+    def _picture(self, view: View, parts: Ints) -> _Buffers:
+        """Return the picture of these parts; one from the sun has no colours."""
+        buffers = self._taken(view)
+        buffers.nearness.fill(view.start)
+        buffers.numbers.fill(NONE)
+        self._raster(view, parts, buffers)
         if view.rays:
-            words, empty = self._flat.view(np.uint32).reshape(-1).take(numbers, mode="wrap"), numbers == NONE
+            words = _looked_up(
+                _words(self._flat), buffers.numbers, _words(buffers.colour).reshape(buffers.numbers.shape)
+            )
+            empty = buffers.numbers == NONE
             if empty.any():
-                words = np.where(empty, sky(view), words)
-            buffers = buffers._replace(colour=words.view(np.uint8).reshape(*shape, 4))
-            self._curve(view, np.flatnonzero(self._model.curved.take(numbers, mode="wrap")), buffers)
+                np.copyto(words, sky(view), where=empty)
+            self._curve(view, np.flatnonzero(buffers.colour[:, :, 3]), buffers)
         return buffers
+
+    def _taken(self, view: View) -> _Buffers:
+        """Return buffers for a view, with any content."""
+        shape, has_colours = (view.height, view.width), bool(view.rays)
+        found = self._buffers.get(has_colours)
+        if found is None or found.numbers.shape != shape:
+            colour = np.empty((*shape, 4) if has_colours else (0, 4), np.uint8)
+            found = _Buffers(np.empty(shape, np.float32), np.empty(shape, np.int32), colour)
+            self._buffers[has_colours] = found
+        return found
 
     def _raster(self, view: View, parts: Ints, buffers: _Buffers) -> None:
         model = self._model
@@ -165,7 +204,7 @@ class Drawer:
         """Colour pixels of curved triangles."""
         triangles = buffers.numbers.reshape(-1)[pixels]
         facing = self._facing_of(view, pixels, triangles)
-        buffers.colour.reshape(-1, 4)[pixels] = coloured(self._model.colours[triangles], facing)
+        _words(buffers.colour)[pixels] = _words(coloured(self._model.colours.take(triangles, axis=0), facing))
 
     def _shadow(self, view: View, pixels: Ints, buffers: _Buffers, sun: View, shadows: NDArray[np.float32]) -> None:
         """Colour pixels with the shadows that a picture from the sun gives, its nearness."""
@@ -175,7 +214,7 @@ class Drawer:
         share, lit = np.zeros(len(pixels), np.float32), np.flatnonzero(facings > 0.0)
         depth = np.float32(1.0) / buffers.nearness.reshape(-1)[pixels[lit]]
         share[lit] = hidden(view, sun, shadows, facings[lit], depth, *_centres(view, pixels[lit]))
-        buffers.colour.reshape(-1, 4)[pixels] = coloured(self._model.colours[triangles], facings, share)
+        _words(buffers.colour)[pixels] = _words(coloured(self._model.colours.take(triangles, axis=0), facings, share))
 
     def _facing_of(self, view: View, pixels: Ints, triangles: NDArray[np.int32]) -> Floats32:
         """Return how pixels face the sun at which these triangles are seen."""
@@ -185,14 +224,30 @@ class Drawer:
         used = np.flatnonzero(present)
         place = np.empty(len(present), np.intp)
         place[used] = np.arange(len(used))
-        corners = model.triangles[used]
-        x, y, z = np.moveaxis(model.world[corners], 2, 0)
+        corners = model.triangles.take(used, axis=0)
+        x, y, z = np.moveaxis(model.world.take(corners, axis=0), 2, 0)
         m = view.matrix
         clip = np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z + m[i + 3] for i in (0, 4, 8)], axis=2)
         return facing_at(clip, model.facing[corners], place[triangles], *_centres(view, pixels))
 
 
+def _words(colours: Picture) -> NDArray[np.uint32]:
+    """Return colours with one number for each, in a row."""
+    return colours.view(np.uint32).reshape(-1)
+
+
+def _looked_up(table: NDArray[Any], triangles: NDArray[np.int32], out: NDArray[Any]) -> NDArray[Any]:
+    """Put the entries of a table (t + 1,) for triangles of pixels into an array, and return it."""
+    numbers, flat = triangles.reshape(-1), out.reshape(-1)
+    for start in range(0, len(flat), LOOKED_UP_AT_ONCE):
+        part = slice(start, start + LOOKED_UP_AT_ONCE)
+        table.take(numbers[part], mode="wrap", out=flat[part])
+    return out
+
+
 def _centres(view: View, pixels: Ints) -> tuple[Floats32, Floats32]:
     """Return the columns and rows of the centres of pixels."""
-    rows, columns = np.divmod(pixels.astype(np.int32), np.int32(view.width))
+    places, width = pixels.astype(np.int32), np.int32(view.width)
+    rows = places // width
+    columns = places - rows * width
     return columns.astype(np.float32) + np.float32(0.5), rows.astype(np.float32) + np.float32(0.5)

@@ -62,7 +62,7 @@ class Lens:
         )
         self._is_seen, self._shape = is_seen, (optics.height, optics.width)
 
-    def nearest(self, values: NDArray[Number], nothing: int) -> NDArray[Number]:
+    def nearest(self, values: NDArray[Number], nothing: float) -> NDArray[Number]:
         """Return the values of the nearest pixels, `nothing` where none is seen."""
         taken = np.where(self._is_seen, values.reshape(-1)[self._nearest], values.dtype.type(nothing))
         return taken.reshape(self._shape)

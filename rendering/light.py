@@ -25,6 +25,8 @@ DIRECT: Final = np.float32(0.5)
 HORIZON: Final = np.array([206, 216, 228], np.float32)
 ZENITH: Final = np.array([116, 156, 210], np.float32)
 BELOW: Final = np.array([128, 130, 132], np.float32)
+DOWN: Final = -0.01
+"""The part along z of directions, 1 along the axis, that are below the horizon with any rounding."""
 
 
 def coloured(colours: Floats32, facing: Floats32, hidden: Floats32 | None = None) -> Picture:
@@ -56,10 +58,14 @@ def facing_at(corners: Floats, facings: Floats, which: Ints, columns: Floats32, 
 
 
 def sky(view: View) -> NDArray[np.uint32]:
-    """Return what is seen of a view where nothing is, (height, width), each a `Picture`'s four bytes."""
+    """Return what is seen of a view where nothing is, (height, width), each a `Picture`'s four bytes: (1,) where
+    all is below the horizon."""
     _, first, across, down = np.array(view.rays).reshape(4, 3)
     columns, rows = np.arange(view.width) + 0.5, np.arange(view.height)[:, np.newaxis] + 0.5
-    up = (first[2] + across[2] * columns).astype(np.float32) + (down[2] * rows).astype(np.float32)
+    by_column, by_row = (first[2] + across[2] * columns).astype(np.float32), (down[2] * rows).astype(np.float32)
+    if by_column.max() + by_row.max() < DOWN:
+        return SKY[:1]
+    up = by_column + by_row
     # Directions by column and by row are at right angles to the axis, along which all are 1 long.
     aside, below = columns - 0.5 * view.width, rows - 0.5 * view.height
     square = np.float32(view.pixel) * np.float32(view.pixel)

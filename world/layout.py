@@ -12,7 +12,7 @@ import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from foosim.common.errors import BadValue, Malformed
 from foosim.common.finding import Location
@@ -35,8 +35,9 @@ from foosim.world.component_types.descriptions import (
 from foosim.world.component_types.jobs import job_slots
 from foosim.world.component_types.per_field import Numbers, numbers_of
 from foosim.world.component_types.settings import ComponentSettings, ModifierSettings, RobotSettings, SensorSettings
-from foosim.world.spec import Shared, WorldSpec
+from foosim.world.spec import WorldSpec
 
+T = TypeVar("T")
 WORLD: Final = "world"
 """Name and model of the entity without a body that has the slots of the world's rules; it is missing in a world whose
 rules have no slots."""
@@ -205,11 +206,12 @@ class Layout:
         """By kind and the identity of the world, which is kept with the value."""
         self._digest = b""
 
-    def shared(self, what: str, spec: WorldSpec, make: Callable[[], Shared]) -> Shared:
+    def shared(self, what: str, spec: WorldSpec, make: Callable[[], T]) -> T:
         """Return a value shared by all users of this layout in a world, built at its first use."""
-        if (what, id(spec)) not in self._shared:
-            self._shared[what, id(spec)] = spec, make()
-        found: Shared = self._shared[what, id(spec)][1]
+        kept = self._shared.get((what, id(spec)))
+        if kept is None:
+            kept = self._shared[what, id(spec)] = spec, make()
+        found: T = kept[1]
         return found
 
     def of(self, model: str) -> tuple[Entity, ...]:

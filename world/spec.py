@@ -42,7 +42,7 @@ SEEDLESS: Final = frozenset({"fetched", "drawn world", "drawer", "casting"})
 """Shared values that are the same with any seed."""
 
 Section = TypeVar("Section", bound=SpecBase)
-Shared = TypeVar("Shared")
+T = TypeVar("T")
 
 
 class Timed(Protocol):
@@ -167,14 +167,14 @@ class WorldSpec(SpecBase):
         """Return the settings of a robot or an object; None of an entity that a kit brings."""
         return self.robots.get(name) or self.objects.get(name)
 
-    def shared(self, what: str, make: Callable[[], Shared]) -> Shared:
+    def shared(self, what: str, make: Callable[[], T]) -> T:
         """Return a value shared by all users of this world, built at its first use."""
-        owner, found = self._shared.get(what, (None, None))
-        if owner is not self:  # a changed copy of a world has what was shared of it
-            found = make()
-            self._shared = {**self._shared, what: (self, found)}
-        made: Shared = found
-        return made
+        kept = self._shared.get(what)
+        if kept is None or kept[0] is not self:  # a changed copy of a world has what was shared of it
+            kept = self, make()
+            self._shared = {**self._shared, what: kept}
+        found: T = kept[1]
+        return found
 
     def with_seed(self, seed: int) -> Self:
         """Return the world with another seed. It shares what draws its scene: that does not depend on the seed."""

@@ -1,4 +1,4 @@
-"""The camera above the football table."""
+"""A standing camera, as that above the football table."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from foosim.world.components.base import Model
 
 
 class CameraRobot(RobotSettings):
-    """A robot without a body that sees the ball."""
+    """A robot without a body: its sensors are at places in the world."""
 
 
-@model("camera", CameraRobot, slots={"down": 1, "refused": 1}, has_body=False, kit="table")
+@model("camera", CameraRobot, slots={"down": 1, "refused": 1}, has_body=False)
 class Camera(Model):
     """A camera: sensors without a body, so that radio waves and viewers meet nothing."""

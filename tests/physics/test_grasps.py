@@ -279,7 +279,8 @@ def test_what_a_holder_in_quarantine_held_falls() -> None:
     ],
 )
 def test_an_object_that_fits_is_taken_and_a_failed_job_has_the_reason(gripper: dict[str, Any], why: str) -> None:
-    with at_crate({"crate": crate(1.0, tags=["crate"])}, **gripper) as made:
+    things = {"crate": crate(1.0, tags=["crate"]), "cup": crate(9.0, tags=["cup"])}
+    with at_crate(things, **gripper) as made:
         jobs = Jobs(made.declared, "script", "a", "gripper")
         jobs.hear(made.readings)
         job = jobs.call(closed=1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from base64 import b64encode
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -24,6 +25,7 @@ from foosim.rendering.cameras import Camera
 from foosim.rendering.png import encode_png
 from foosim.simulation.run import rehearse
 from foosim.simulation.verify import simulated_again
+from foosim.world.frame import Frame
 from foosim.world.layout import build_layout
 from tests.console.memory import running
 from tests.deployed import TABLE, TEXT
@@ -147,6 +149,11 @@ def test_commands_export_pictures(capture: CaptureData, tmp_path: Path, monkeypa
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "png"]
 
 
+def first_frame(capture: CaptureData) -> Iterator[Frame]:
+    yield next(simulated_again(capture))
+    raise Failed("no second frame")
+
+
 def test_what_cannot_be_exported_is_refused(
     capture: CaptureData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,6 +164,12 @@ def test_what_cannot_be_exported_is_refused(
     ):
         with pytest.raises(BadValue, match=problem):
             export_pictures(capture.path, tmp_path / "out.mp4", form, cameras, ALL, simulated_again)
+    for form, camera in (("png", "*/eye"), ("mcap", "*/unheard"), ("video", "overview")):
+        with pytest.raises(BadValue, match="no camera has a picture in this span; the capture has 0 s to 120 ms, '1 s"):
+            export_pictures(capture.path, tmp_path / "out", form, [camera], (10**9, None), simulated_again)
+    with pytest.raises(Failed, match="no second frame"):
+        export_pictures(capture.path, tmp_path / "out", "png", ["*/between"], ALL, first_frame)
+    assert [*tmp_path.iterdir()] == []
     for camera in ("camera/eye", "overview"):
         with pytest.raises(Failed, match="a video needs ffmpeg: no such program"):
             export_pictures(capture.path, tmp_path / "out.mp4", "video", [camera], ALL, simulated_again)

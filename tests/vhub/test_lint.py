@@ -10,12 +10,15 @@ from typing import Any, Final
 
 import pytest
 
+from foosim.capture.reader import open_capture
+from foosim.capture.rows import PACKETS, PacketRow
 from foosim.common.keyed_random import draw_key, draw_words
 from foosim.deployment.loader import apply_sets, expanded_text, load_deployment
 from foosim.deployment.network.impairments import Impairments
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.schema import Deployment
+from foosim.simulation.run import rehearse
 from foosim.simulation.simulation import read_for_stepping
 from foosim.vhub.links.offered_load import warnings_of
 from foosim.vhub.links.summary import (
@@ -31,7 +34,9 @@ from foosim.vhub.links.summary import (
 )
 from foosim.vhub.links.summary_text import LINES_MAX, start_lines, summary_line
 from foosim.vhub.network.jitter import interpolate_ns, quantiles_ns
+from tests.deployed import TEXT, deployed
 from tests.turns import BY_PERIOD
+from tests.waving import PLAYERS
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 APPROXIMATELY: Final = partial(pytest.approx, rel=1e-6)
@@ -209,6 +214,13 @@ def test_who_offers_more_than_is_carried_is_warned_of() -> None:
     made = deployment("{links: [{id: thin, from: '*', to: '*', rate: 64 kbit/s}]}")
     (thin,) = summaries(made)
     assert thin.warnings == ("one sender offers 100 frames/s as declared; of 100 B it carries 80/s",)
+    radios = "network={radios: {w: {preset: wifi_5_indoor%s}}, robots: {'*': [w]}, places: {'*': [1 m, 1 m, 1 m]}}"
+    player = "players={p: {class: 'tests.waving:Waver', rate: 1 Hz, hears: {'*': [encoder]}}}"
+    for rate_hz, unicast in ((250, ""), (500, ""), (500, ", published: unicast")):
+        sets = [f"robots.{rod}.sensors.encoder.rate={rate_hz} Hz" for rod in RODS]
+        (wifi,) = [one for one in summaries(deployed(*sets, player, radios % unicast)) if one.radio]
+        warned = [text for text in wifi.warnings if text.startswith("all together offer 4000 frames/s as declared")]
+        assert len(warned) == (rate_hz == 500 and not unicast), "of 100 B it broadcasts 3140/s, and unicasts 5040/s"
 
 
 @pytest.mark.parametrize("limit", [16, 1023, 1024])
@@ -222,6 +234,33 @@ def test_packets_that_do_not_fit_into_a_queue_are_named(limit: int) -> None:
     assert ("rover01 proximity (1024 B)" in warning) == (limit < 1024)
     assert ("rover02 proximity (128 B)" in warning) == (limit < 128) and " drive (" not in warning
     assert warning in "\n".join(start_lines(summaries(made), "some.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("limits", "offset", "is_crowded"),
+    [
+        ("bytes: 1119 B", "0 s", True),
+        ("bytes: 1120 B", "0 s", False),
+        ("bytes: 1119 B", "4 ms", False),
+        ("packets: 1", "0 s", True),
+        ("packets: 2", "0 s", False),
+    ],
+)
+def test_sensors_due_at_one_tick_that_overflow_a_queue_are_named(limits: str, offset: str, is_crowded: bool) -> None:
+    """The warning is there where packets are dropped: two of 500 B in frames of 250 B, each with 30 B of overhead."""
+    eye, slow = (f"kind: camera, rate: {rate}, width: 8, height: 8, size: 500 B" for rate in ("50 Hz", "1 Hz"))
+    slow += ", offset: 1 ms"
+    sets = [
+        f"robots.camera.sensors={{ball: {{{eye}}}, other: {{{eye}, offset: {offset}}}, slow: {{{slow}}}}}",
+        PLAYERS.replace("camera: [ball]", "camera: [ball, other, slow]"),
+        "network.links=[{id: thin, from: camera, to: '*', rate: 5 Mbit/s, overhead: 30 B, mtu: 250 B}]",
+        f"network.links.thin.queue={{{limits}}}",
+    ]
+    warned = [text for text in warnings_of(deployed(*sets)) if "packets of one tick that do not fit" in text]
+    named = "camera ball to waver (560 B), camera other to waver (560 B)"
+    assert len(warned) == is_crowded and all(text.startswith("thin: ") and named in text for text in warned)
+    run = rehearse(TEXT, TABLE.name, 25, 1, [*sets])
+    assert not run.json["failed"] and bool(run.json["packets"]["dropped"]) == is_crowded
 
 
 def test_commands_of_a_fixed_or_a_jointed_size_that_do_not_fit_into_a_queue_are_named() -> None:
@@ -253,12 +292,45 @@ def test_a_network_alone_is_shown_over_its_radios() -> None:
     assert [use.rule for use in uses_alone(Network())] == ["perfect"]
 
 
+@pytest.mark.parametrize("published", ["broadcast", "unicast"])
+def test_wifi_carries_sensors_at_the_rate_that_their_packets_then_have(published: str, tmp_path: Path) -> None:
+    wifi = f"{{preset: wifi_5_indoor, published: {published}}}"
+    sets = [
+        "robots.camera.sensors={ball: {kind: camera, rate: 50 Hz, width: 8, height: 8, size: 1500 B}}",
+        PLAYERS,
+        f"network={{radios: {{w: {wifi}}}, robots: {{'*': [w]}}, places: {{'*': [1 m, 1 m, 1 m]}}}}",
+    ]
+    run = rehearse(TEXT, TABLE.name, 25, 1, sets, capture=tmp_path / "run.mcap")
+    assert not run.json["failed"]
+    (found,) = (one for one in summaries(deployed(*sets)) if one.radio)
+    at = found.rate_bps if published == "unicast" else found.broadcast_bps
+    large = (found.carried if published == "unicast" else found.broadcast)[-1]
+    rows = [row for row in open_capture(tmp_path / "run.mcap").rows(PACKETS) if isinstance(row, PacketRow)]
+    seen = {(row.rate_bps, row.airtime_ns) for row in rows if row.size == large.size}
+    assert seen == {(at, large.airtime_ns)}
+    assert ("broadcasts at 6 Mbit/s, 100 B: " in summary_line(found)) == (published == "broadcast")
+
+
+def test_the_latency_of_a_camera_counts_as_delay() -> None:
+    """With 8 ms it is 10 ms old at the next turn but one, as the delay explains."""
+    link = "network.links=[{id: w, from: '*', to: '*', delay: 1300 us}]"
+    player = "players={one: {class: 'tests.waving:Waver', rate: 100 Hz, robots: {camera: [eye]}}}"
+    for latency, warned in (
+        ("2 ms", ["one sees camera eye 10 ms old, of which the delay explains 4 ms"]),
+        ("8 ms", []),
+    ):
+        eye = f"robots.camera.sensors={{eye: {{kind: camera, rate: 100 Hz, latency: {latency}}}}}"
+        (summary,) = summaries(deployed(eye, player, link))
+        assert [text.partition(":")[0] for text in summary.warnings] == warned
+
+
 def test_lines_are_for_people() -> None:
     wifi = summary_of(SharedSettings("wifi", "wifi", radio(preset="wifi_5_indoor"), 2, 1, ("a", "b")), {})
     assert summary_line(wifi) == (
         "wifi: wifi, 1 of 2 links carry declared packets (as a to b), loss 0.05 %, bursts of 20 ms, delay 600 us, "
         "sd 301 us, p99 1.68 ms, at 54 Mbit/s, 100 B: 44 us, 4.03 Mbit/s, 10 stations 4.319 Mbit/s, 1500 B: 248 us, "
-        "29.81 Mbit/s, 10 stations 26.76 Mbit/s, range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
+        "29.81 Mbit/s, 10 stations 26.76 Mbit/s, broadcasts at 6 Mbit/s, 100 B: 208 us, 1500 B: 2.07 ms, "
+        "range 7.37 km in sight, behind walls 112 m, queue of 17.3 ms"
     )
     lines = start_lines([wifi] * 40, "some.yaml")
     assert len(lines) == LINES_MAX and lines[-1] == "and 29 more: foosim net lint some.yaml"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import product
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pytest
@@ -175,6 +175,7 @@ def test_a_reading_that_the_network_has_changed_is_malformed(bodies: tuple[float
         changed.image()
 
 
+TAGGED: Final = "robots.red.goal.tags=[rod]"
 REFUSED = {
     "kind: camera, width: 100000": "eye.width: more than the most that is valid, 1280, 100000",
     "kind: camera, height: 961": "eye.height: more than the most that is valid, 960, 961",
@@ -185,22 +186,22 @@ REFUSED = {
     "kind: camera, look_at: {entity: bal}": "eye.look_at.entity: no entity with a body, 'bal', nearest is 'ball'",
     "kind: camera, at: {link: spin}": "eye.at.link: camera has no body",
     "kind: camera, modifiers: [{kind: gaussian_noise, std: 1}]": "a modifier changes numbers alone",
-    "kind: semantic_camera, tag: ball, look_at: {entity: rat}": "no entity with a body",
+    "kind: semantic_camera, tag: rod, look_at: {entity: rat}": "no entity with a body",
 }
 
 
 @pytest.mark.parametrize("settings", REFUSED)
 def test_settings_that_cannot_be_are_refused(settings: str) -> None:
     with pytest.raises(DeploymentError) as error:
-        with_eye(settings)
+        with_eye(settings, TAGGED)
     assert REFUSED[settings] in str(error.value).replace("robots.camera.sensors.", "")
 
 
 @pytest.mark.parametrize(
-    "kind", ["rgbd", "semantic_camera, tag: b", "laser_scanner_3d, rows: 1, columns: 2, range: 1 m"]
+    "kind", ["rgbd", "semantic_camera, tag: rod", "laser_scanner_3d, rows: 1, columns: 2, range: 1 m"]
 )
 def test_settings_are_checked_before_the_files_of_the_scenery_are_read(kind: str) -> None:
-    with_eye(f"kind: {kind}", "scenery={wedge: {shape: mesh, file: wedge.obj}}")
+    with_eye(f"kind: {kind}", TAGGED, "scenery={wedge: {shape: mesh, file: wedge.obj}}")
 
 
 def test_more_moving_bodies_than_a_packet_takes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,8 +35,8 @@ def problems(text: str, *sets: str) -> list[str]:
 @pytest.mark.parametrize(
     ("setting", "problem"),
     [
-        ("robots.base={model: camera, sensors: {}}",
-         "robots.base.model: a robot of a table in a world without one, 'camera'"),
+        ("robots.base={model: rod, team: red, line: goal, sensors: {}, actuators: {}}",
+         "robots.base.model: a robot of a table in a world without one, 'rod'"),
         ("robots.rover01.x=3 m", "robots.rover01.x: the rover starts in a wall of the hall, '3 m, 12.4 m'"),
         ("robots.rover01.x=-1 m", "robots.rover01.x: the rover starts in scenery.shelf-north-outer-2, '-1 m, 9 m'"),
         ("robots.rover03.x=4 m", "robots.rover03.x: the rover starts in the rover rover01, '4 m, 6.5 m'"),

@@ -6,20 +6,26 @@ the players that hear them, at an undeclared rate. Pure: used by `lint`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Final
 
 from foosim.common.limits import FRAMES_MAX
+from foosim.deployment.network.impairments import Queue
 from foosim.deployment.network.link_settings import Profile, Profiles
+from foosim.deployment.network.settings_text import sends_once
 from foosim.deployment.schema import Deployment
 from foosim.vhub.network.mtu import frame_count, longest_of
 from foosim.world.component_types.per_field import payload_bytes
 from foosim.world.component_types.settings import SensorSettings
+from foosim.world.spec import Schedule
 
 Key = tuple[str, str]
 """Settings that links share: the rule and the radio."""
 Pair = tuple[str, str]
+TICKS: Final = 2000
+"""The ticks that are searched for sensors that are due together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +53,13 @@ class Flow:
     @property
     def is_once_for_all(self) -> bool:
         """Whether the radio broadcasts it: it is sent once for all receivers."""
-        return self.channel != "" and self.profile.settings.is_on_air and self.profile.settings.published == "broadcast"
+        return self.channel != "" and sends_once(self.profile.settings)
+
+    @property
+    def queue_bytes(self) -> float:
+        """The greatest size of its queue; inf where packets do not wait."""
+        its = self.profile.settings
+        return its.queue.bytes_max if its.medium != "none" or its.rate_bps is not None or its.trace is not None else inf
 
 
 def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
@@ -73,17 +85,17 @@ def used_links(flows: Iterable[Flow]) -> dict[Key, set[Pair]]:
     return found
 
 
-def offered_hz(flows: Iterable[Flow]) -> dict[Key, float]:
-    """Return the frames per second on an air, or without one of the busiest queue, by settings."""
+def offered_hz(flows: Iterable[Flow]) -> dict[tuple[Key, bool], float]:
+    """Return the frames per second on an air, or without one of the busiest queue: by settings, broadcasts apart."""
     once = {
         (flow.key, flow.queue, "" if flow.is_once_for_all else flow.destination, flow.channel): flow for flow in flows
     }
-    queues: dict[Key, dict[str, float]] = {}
-    on_air: dict[Key, bool] = {}
+    queues: dict[tuple[Key, bool], dict[str, float]] = {}
+    on_air: dict[tuple[Key, bool], bool] = {}
     for flow in once.values():
-        of_key = queues.setdefault(flow.key, {})
+        of_key = queues.setdefault(key := (flow.key, flow.is_once_for_all), {})
         of_key[flow.queue] = of_key.get(flow.queue, 0.0) + flow.rate_hz * flow.frames
-        on_air[flow.key] = flow.profile.settings.is_on_air
+        on_air[key] = flow.profile.settings.is_on_air
     return {key: sum(rates.values()) if on_air[key] else max(rates.values()) for key, rates in queues.items()}
 
 
@@ -93,8 +105,7 @@ def long_packets(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str
     limits: dict[Key, str] = {}
     for flow in flows:
         settings = flow.profile.settings
-        has_queue = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
-        in_queue, in_frames = settings.queue.bytes_max if has_queue else inf, longest_of(settings) or inf
+        in_queue, in_frames = flow.queue_bytes, longest_of(settings) or inf
         limit = min(in_queue, in_frames)
         limits[flow.key] = (
             f"the queue of {in_queue} B"
@@ -112,12 +123,39 @@ def long_packets(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str
     return texts
 
 
+def crowded_queues(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str]:
+    """Return a warning of sensors of a robot whose packets of one tick overflow a queue, by settings of links."""
+    queues: dict[tuple[Key, str], tuple[Queue, dict[str, tuple[Schedule, int]]]] = {}
+    for flow in flows:
+        _, sent = queues.setdefault((flow.key, flow.queue), (flow.profile.settings.queue, {}))
+        for channel, size in _sizes(deployment, flow) if flow.channel else ():
+            if size <= flow.queue_bytes < inf:
+                schedule = deployment.schedule(deployment.robots[flow.source].sensors[flow.channel])
+                to = "" if flow.is_once_for_all else f" to {flow.destination}"
+                sent[channel + to] = schedule, size + flow.profile.settings.overhead_bytes * flow.frames
+    texts: dict[Key, str] = {}
+    for (key, _), (queue, sent) in queues.items():
+        due = {channel: size for channel, (_, size) in sent.items()}
+        for tick in range(TICKS if _overflows(queue, due) else 0):
+            due = {channel: size for channel, (schedule, size) in sent.items() if schedule.is_due(tick)}
+            if _overflows(queue, due):
+                limit = f"{queue.packets} packets" if len(due) > queue.packets else f"{queue.bytes_max} B"
+                named = ", ".join(f"{channel} ({size} B)" for channel, size in due.items())
+                what = f"packets of one tick that do not fit into the queue of {limit} together are dropped: {named}"
+                texts[key] = f"{what}; an offset of some of these sensors, smaller packets or a greater queue help"
+                break
+    return texts
+
+
+def _overflows(queue: Queue, due: Mapping[str, int]) -> bool:
+    return len(due) > queue.packets or sum(due.values()) > queue.bytes_max
+
+
 def warnings_of(deployment: Deployment) -> list[str]:
     """Return these warnings of a deployment, with the names of links' settings."""
-    found = long_packets(deployment, flows_of(deployment, deployment.profiles()))
-    return [
-        f"{rule if radio in ('', rule) else f'{rule} via {radio}'}: {text}" for (rule, radio), text in found.items()
-    ]
+    flows = [*flows_of(deployment, deployment.profiles())]
+    found = [*long_packets(deployment, flows).items(), *crowded_queues(deployment, flows).items()]
+    return [f"{rule if radio in ('', rule) else f'{rule} via {radio}'}: {text}" for (rule, radio), text in found]
 
 
 def _sizes(deployment: Deployment, flow: Flow) -> Iterator[tuple[str, int]]:

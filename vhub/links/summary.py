@@ -17,10 +17,11 @@ from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairm
 from foosim.deployment.network.link_settings import NO_RADIO, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
+from foosim.deployment.network.settings_text import sends_once
 from foosim.deployment.network.traces import read_opportunities
 from foosim.deployment.schema import Deployment
 from foosim.deployment.validate_network import unheeded
-from foosim.vhub.links.offered_load import flows_of, long_packets, offered_hz, used_links
+from foosim.vhub.links.offered_load import crowded_queues, flows_of, long_packets, offered_hz, used_links
 from foosim.vhub.network.jitter import interpolate_ns, jitter_ns, moments_ns
 from foosim.vhub.radio import errors
 from foosim.vhub.radio.airtime import (
@@ -108,6 +109,10 @@ class LinkSummary:
     """The share of packets that the next one overtakes, when one comes every SPACING_NS; None where none does."""
     rate_bps: int | None
     carried: tuple[Throughput, ...]
+    broadcast_bps: int | None
+    """The bit rate of broadcasts, where it is not that of unicasts."""
+    broadcast: tuple[Throughput, ...]
+    """What is carried of broadcasts alone; `carried` where all packets are sent alike."""
     range_los_m: float | None
     """At which 90 % of single frames of SMALL_BYTES arrive, at the lowest rate, in line of sight."""
     range_nlos_m: float | None
@@ -173,24 +178,24 @@ def summaries(deployment: Deployment) -> list[LinkSummary]:
     """Return the summary of a deployment's network; the deployment has its files."""
     uses = uses_of(deployment)
     flows = [*flows_of(deployment, deployment.profiles())]
-    offered, too_long = offered_hz(flows), long_packets(deployment, flows)
+    offered, too_long, crowded = offered_hz(flows), long_packets(deployment, flows), crowded_queues(deployment, flows)
     files = deployment.asset_files
     phased = phase_warnings(deployment, lambda settings: delay_of(settings, files)[2])
     found = []
     for use in uses:
         summary = summary_of(use, files)
-        warnings = [*summary.warnings, *phased.get((use.rule, use.radio), ())]
-        if (use.rule, use.radio) in too_long:
-            warnings.append(too_long[use.rule, use.radio])
+        key = use.rule, use.radio
+        warnings = [*summary.warnings, *phased.get(key, ()), *(of[key] for of in (too_long, crowded) if key in of)]
         if use.links == 0:
             warnings.append("no link uses it")
-        capacity_hz = _capacity_hz(summary)
-        load_hz = offered.get((use.rule, use.radio), 0.0)
-        if capacity_hz is not None and load_hz > capacity_hz:
+        carried = {once: _capacity_hz(summary.broadcast if once else summary.carried) for once in (False, True)}
+        loads = {once: offered.get((key, once), 0.0) for once in carried}
+        busy = sum(load_hz / max(carried[once], 1e-9) for once, load_hz in loads.items())
+        if busy > 1.0:
             which = "all together offer" if use.settings.is_on_air else "one sender offers"
-            warnings.append(
-                f"{which} {load_hz:.0f} frames/s as declared; of {SMALL_BYTES} B it carries {capacity_hz:.3g}/s"
-            )
+            load_hz = sum(loads.values())
+            what = f"{which} {load_hz:.0f} frames/s as declared"
+            warnings.append(f"{what}; of {SMALL_BYTES} B it carries {load_hz / busy:.3g}/s")
         found.append(replace(summary, warnings=tuple(warnings)))
     return found
 
@@ -200,7 +205,7 @@ def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
     settings = use.settings
     loss, burst_packets, burst_ns = residual_of(settings)
     mean_ns, sd_ns, p99_ns = delay_of(settings, files)
-    carried = carried_of(settings, files)
+    carried, is_slow = carried_of(settings, files), settings.medium == "wifi" and sends_once(settings)
     los_m, nlos_m = ranges_of(settings, use.heights_m)
     duty = settings.duty_cycle
     is_limited = settings.is_on_air and duty < 1.0 and carried
@@ -220,6 +225,8 @@ def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
         reordered_of(settings, files),
         rate_of(settings, files),
         carried,
+        errors.MODES[_wifi_mode(settings, lowest=True)].rate_bps if is_slow else None,
+        tuple(_carried(settings, one.size, 0, lowest=True) for one in carried) if is_slow else carried,
         los_m,
         nlos_m,
         packets_an_hour(duty, settings.duty_window_ns, carried[0].airtime_ns) if is_limited else None,
@@ -363,11 +370,12 @@ def carried_of(settings: Radio, files: Mapping[str, bytes]) -> tuple[Throughput,
     return () if not rate_bps else tuple(_carried(settings, size, rate_bps) for size in sizes if size)
 
 
-def _carried(settings: Radio, size: int, rate_bps: int) -> Throughput:
+def _carried(settings: Radio, size: int, rate_bps: int, *, lowest: bool = False) -> Throughput:
+    """Return the figures of a size; with `lowest` those of broadcasts over Wi-Fi, without acknowledgements."""
     bits = 8 * size
     if settings.medium == "wifi":
-        mode, timing = _wifi_mode(settings), wifi_timing(settings)
-        airtime_ns, ack_ns = wifi_airtime_ns(mode, size, timing), wifi_ack_ns(mode, timing)
+        mode, timing = _wifi_mode(settings, lowest=lowest), wifi_timing(settings)
+        airtime_ns, ack_ns = wifi_airtime_ns(mode, size, timing), 0 if lowest else wifi_ack_ns(mode, timing)
         one, many = (saturation_rate_hz(n, airtime_ns, ack_ns, timing) for n in (1, MANY))
         return Throughput(size, airtime_ns, int(bits * one), int(bits * many))
     if settings.medium == "ieee802154":
@@ -456,10 +464,10 @@ def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
         yield "these endpoints have no radio in common, or not that of their rule: nothing passes (no_route)"
 
 
-def _capacity_hz(summary: LinkSummary) -> float | None:
-    if not summary.carried:
-        return None
-    small = summary.carried[0]
+def _capacity_hz(carried: Sequence[Throughput]) -> float:
+    if not carried:
+        return inf
+    small = carried[0]
     bps = small.goodput_bps if small.shared_bps is None else max(small.goodput_bps, small.shared_bps)
     return bps / 8.0 / small.size
 
@@ -505,7 +513,7 @@ def _phases(deployment: Deployment, late_ns: Callable[[Radio], int]) -> Iterator
             every = turn // step
             sampled = -(shift // step) % every
             profile = profiles.find(source, name, channel)
-            delay = -(-late_ns(profile.settings) // tick_ns)
+            delay = -(-(late_ns(profile.settings) + robot.sensors[channel].late_by_ns) // tick_ns)
             common = gcd(period, every)
             waits = (own - delay - sampled) % common
             mean = delay + waits + (every - common) / 2

@@ -54,6 +54,9 @@ def summary_line(summary: LinkSummary) -> str:
     for carried in summary.carried:
         many = "" if carried.shared_bps is None else f", {MANY} stations {rate_text(carried.shared_bps)}"
         parts.append(f"{carried.size} B: {time_text(carried.airtime_ns)}, {rate_text(carried.goodput_bps)}{many}")
+    if summary.broadcast_bps:
+        times = ", ".join(f"{carried.size} B: {time_text(carried.airtime_ns)}" for carried in summary.broadcast)
+        parts.append(f"broadcasts at {rate_text(summary.broadcast_bps)}, {times}")
     if summary.range_los_m is not None:
         walls = "as they allow" if summary.range_nlos_m is None else range_text(summary.range_nlos_m)
         parts.append(f"range {range_text(summary.range_los_m)} in sight, behind walls {walls}")

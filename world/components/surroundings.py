@@ -5,6 +5,7 @@ All of it follows from the frame; entities are in name order.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 from foosim.world.components.entities import made_model
@@ -35,7 +36,6 @@ class Surroundings:
 
     def __init__(self, spec: WorldSpec, layout: Layout) -> None:
         self._spec, self._layout = spec, layout
-        self._bodies: dict[str, Body | None] = {}
 
     def tags(self, entity: Entity) -> frozenset[str]:
         """Return the tags of an entity: those of its model and of its settings."""
@@ -48,7 +48,7 @@ class Surroundings:
 
     def poses(self, view: View, entity: Entity) -> list[Pose]:
         """Return name, position (m) and orientation of each link of an entity, in the world frame; none without one."""
-        body = self._body(entity)
+        body = self.bodies.get(entity.name)
         return [] if body is None else forward_kinematics(body, entity, view.start)
 
     def position(self, view: View, entity: Entity) -> Vector | None:
@@ -91,13 +91,15 @@ class Surroundings:
         """The bodies of the layout and the scenery, which all components of it share."""
         return self._layout.shared("scene", self._spec, self._made_scene)
 
-    @property
+    @cached_property
     def bodies(self) -> dict[str, Body]:
         """The bodies of the layout by name, which all components of it share; they need no file of the scenery."""
         return self._layout.shared("bodies", self._spec, self._made_bodies)
 
     def _made_bodies(self) -> dict[str, Body]:
-        return {entity.name: body for entity in self._layout.entities if (body := self._body(entity)) is not None}
+        spec, layout = self._spec, self._layout
+        models = {one.name: made_model(spec, layout, one) for one in layout.entities if one.name != WORLD}
+        return {name: body for name, model in models.items() if (body := model.body()) is not None}
 
     def _made_scene(self) -> Scene:
         return Scene(self.bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
@@ -110,10 +112,3 @@ class Surroundings:
             return Contacts(0, 0.0, -1)
         touches, impulse, last = view.start[at : at + 3]
         return Contacts(int(touches), impulse, int(last))
-
-    def _body(self, entity: Entity) -> Body | None:
-        if entity.name == WORLD:
-            return None
-        if entity.name not in self._bodies:
-            self._bodies[entity.name] = made_model(self._spec, self._layout, entity).body()
-        return self._bodies[entity.name]
