@@ -37,6 +37,7 @@ def check(
     from foosim.deployment.loader import expanded_text
     from foosim.launcher.plan import check_players_here, make_plan
     from foosim.vhub.links.offered_load import warnings_of
+    from foosim.world.bodies.visual_meshes import undrawn_meshes
 
     plan = make_plan(options)
     check_players_here(plan)
@@ -50,7 +51,7 @@ def check(
         "nodes": sorted(deployment.nodes),
         "players": sorted(deployment.players),
     }
-    for warning in warnings_of(deployment):
+    for warning in (*warnings_of(deployment), *undrawn_meshes(deployment.asset_files)):
         typer.echo(f"{options.file}: warning: {warning}", err=True)
     described = f"{len(deployment.robots)} robots on {len(deployment.nodes)} nodes, {len(deployment.players)} players"
     if json:

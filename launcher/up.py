@@ -37,6 +37,7 @@ from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
 from foosim.runtime.transport.admission import Exposure
 from foosim.runtime.transport.certificates import operator_credentials
 from foosim.runtime.transport.session import ConnectError
+from foosim.world.bodies.visual_meshes import undrawn_meshes
 
 POLL_S: Final = 0.02
 """Polling period while a run starts."""
@@ -167,6 +168,8 @@ class Up:
             display.say(self.plan.branch.text)
         if C is None:
             display.say(f"kernels of rays and pictures run {KERNELS}")
+        for undrawn in undrawn_meshes(self.plan.deployment.asset_files):
+            display.say(undrawn)
         for process in self.plan.processes.values():
             if len(process.roles) > 1:
                 display.say(f"process {process.name} has {', '.join(process.roles)}")

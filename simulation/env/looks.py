@@ -50,5 +50,5 @@ class Looks:
             found[name] = np.zeros(size, form)
             if packet is not None:
                 with suppress(Malformed):
-                    found[name] = codec.decode(packet.payload).picture(kind)
+                    found[name][...] = codec.decode(packet.payload).picture(kind)
         return found

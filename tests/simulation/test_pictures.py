@@ -71,6 +71,7 @@ def test_an_environment_observes_pictures() -> None:
     first, _ = env.reset()
     second, *_ = env.step(np.zeros(len(env.columns[1])))
     assert env.observation_space.contains(first) and env.observation_space.contains(second)
+    assert not any(np.shares_memory(first[name], second[name]) for name in first)
     assert sorted(second) == ["camera/eye.depth", "camera/eye.image", "readings"]
     sight = env.simulation.readings["camera", "eye"].value
     assert np.array_equal(second["camera/eye.image"], sight.image())  # type: ignore[union-attr]

@@ -16,7 +16,7 @@ from foosim.world.bodies.inertia import principal_of, solid, solid_of, turned
 from foosim.world.bodies.urdf import Robot, body_of, read_urdf
 from foosim.world.bodies.urdf_base import base_of
 from foosim.world.bodies.urdf_text import as_json, snippet
-from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content
+from foosim.world.bodies.visual_meshes import drawn_content, undrawn_content, undrawn_meshes
 from foosim.world.components.drives import Drives, Motor
 from foosim.world.components.joint_names import joint_indices
 from foosim.world.matter.mesh import AssetError, Mesh
@@ -391,6 +391,10 @@ def test_meshes_that_cannot_be_drawn_for_one_reason_are_one_note() -> None:
     looks = visual('<mesh filename="a.obj"/>') + "\n"
     robot = read(link("a", MASS + BALL + looks * 2), drawn=undrawn_content("a.obj: too round"))
     assert robot.notes == ("a visual is not drawn, a.obj (lines 2, 3): too round",)
+    whole = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    drawn = {"a.obj": undrawn_content("a.obj: gone"), "b.obj": drawn_content("b.obj", whole)}
+    given = {"r.urdf": b"", **{f"{name}.visual": content for name, content in drawn.items()}}
+    assert undrawn_meshes(given) == ["a visual is not drawn, a.obj: gone"]
 
 
 def test_a_bad_colour_is_no_error() -> None:

@@ -6,6 +6,7 @@ own. One that is missing or unreadable is drawn by nothing, and its drawn form h
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 import msgspec
@@ -78,6 +79,12 @@ def drawn_content(name: str, content: bytes, triangles_max: int = TRIANGLES_MAX)
 def undrawn_content(problem: str) -> bytes:
     """Return the drawn form of a mesh that cannot be drawn."""
     return msgspec.msgpack.encode(_Drawn(0, [], problem))
+
+
+def undrawn_meshes(files: Mapping[str, bytes]) -> list[str]:
+    """Return a line for each drawn form among files that has no triangles, with the reason."""
+    drawn = [msgspec.msgpack.decode(files[path], type=_Drawn) for path in sorted(files) if undrawn_path(path)]
+    return [f"a visual is not drawn, {one.problem}" for one in drawn if one.problem]
 
 
 def drawn_parts(content: bytes) -> tuple[list[Part], str]:

@@ -89,7 +89,9 @@ class Surroundings:
     @property
     def scene(self) -> Scene:
         """The bodies of the layout and the scenery, which all components of it share."""
-        return self._layout.shared("scene", self._spec, self._made_scene)
+        return self._layout.shared(
+            "scene", self._spec, lambda: Scene(self.bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
+        )
 
     @cached_property
     def bodies(self) -> dict[str, Body]:
@@ -100,9 +102,6 @@ class Surroundings:
         spec, layout = self._spec, self._layout
         models = {one.name: made_model(spec, layout, one) for one in layout.entities if one.name != WORLD}
         return {name: body for name, model in models.items() if (body := model.body()) is not None}
-
-    def _made_scene(self) -> Scene:
-        return Scene(self.bodies, (*fixed_shapes(self._spec), *self._spec.scenery_shapes()))
 
     @staticmethod
     def contacts(view: View, entity: Entity) -> Contacts:
