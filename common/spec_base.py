@@ -20,7 +20,6 @@ Rate = Annotated[Fraction, Quantity(units.RATE, RATE_MIN, "10 kHz")]
 Offset = Annotated[int, Quantity(units.TIME, "0 s", "1000 s")]
 """Offset of an event from the multiples of its period: below the period, whole ticks for lockstep clients."""
 LengthNoise = Annotated[float, Quantity(units.LENGTH, "0 m", "1 m")]
-AngleNoise = Annotated[float, Quantity(units.ANGLE, "0 deg", "180 deg")]
 Gravity = Annotated[float, Quantity(units.ACCELERATION, "0 m/s2", "100 m/s2")]
 Length = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "10 m")]
 LengthOrNone = Annotated[float, Quantity(units.LENGTH, "0 m", "10 m")]

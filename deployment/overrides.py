@@ -13,13 +13,13 @@ import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any, Final, get_origin
+from typing import Any, Final
 
 from foosim.common.errors import DeploymentError, describe, show
 from foosim.common.names import nearest_name
-from foosim.deployment.network.rules import Network
-from foosim.deployment.schema import Deployment, Player
-from foosim.deployment.text.expand import Expansion
+from foosim.deployment.components import SECTIONS
+from foosim.deployment.schema import Deployment
+from foosim.deployment.text.expand import ENTRIES, Expansion
 from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.templates import TEMPLATES
 from foosim.deployment.text.yaml import (
@@ -34,17 +34,11 @@ from foosim.deployment.text.yaml import (
     plain,
     read_tree,
 )
-from foosim.world.component_types.settings import RobotSettings
 
 ENTRIES_SHOWN_MAX: Final = 8
 SETS_MAX: Final = 256
 SET_LENGTH_MAX: Final = 4096
-NAMED: Final = {TEMPLATES} | {
-    key
-    for section in (Deployment, Player, Network, RobotSettings)
-    for key, field in section.model_fields.items()
-    if get_origin(field.annotation) is dict
-}
+NAMED: Final = {TEMPLATES, *ENTRIES, *SECTIONS, "nodes", "hosts", "radios", "places", "surfaces"}
 """The sections whose keys are names."""
 
 _STEP = re.compile(r'(?:"(?P<quoted>[^"]*)"|(?P<plain>[^".=\[\]]+))')

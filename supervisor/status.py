@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from msgspec.structs import asdict
 
@@ -29,10 +29,6 @@ class SupervisorStatistics:
     refused: int
     repeated: int
     diverged: int
-
-
-DISRUPTIONS_SHOWN: Final = 16
-"""The last requested events of the network that a status has."""
 
 
 def in_quarantine(frame: Frame) -> list[str]:

@@ -22,7 +22,7 @@ from foosim.console.report.tallies import LinkAge, RuleTally, SenderTally, Tally
 from foosim.console.shown.timeline import EPOCH, MOVE, NETWORK, RECOVERY, Timeline
 from foosim.deployment.network.link_settings import Profile
 from foosim.deployment.network.rules import event_of
-from foosim.deployment.network.settings_text import event_words, impairments_text, radio_text, rule_ends, sends_once
+from foosim.deployment.network.settings_text import event_words, impairments_text, radio_text, rule_ends
 from foosim.vhub.links.summary import delay_of, residual_of
 from foosim.vhub.network.timeline import Timeline as NetworkTimeline
 from foosim.world.assembly.world import mark_kinds
@@ -120,7 +120,7 @@ class Collected:
             sender = row.source, row.radio or row.rule
             if sender not in self._senders:
                 self._senders[sender] = SenderTally(*sender)
-            self._senders[sender].add(row, sends_once=sends_once(self._profiles[by].settings))
+            self._senders[sender].add(row, sends_once=self._profiles[by].settings.sends_once)
 
     def _channel(self, name: str) -> list[Tally]:
         if name not in self._channels and len(self._channels) >= CHANNELS_MAX:

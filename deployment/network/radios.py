@@ -122,6 +122,16 @@ class RadioKeys(LinkSettings):
         """Whether packets go by radio: where the ends are decides, and others on air."""
         return self.medium not in ("none", "wired")
 
+    @property
+    def sends_once(self) -> bool:
+        """Whether a broadcast is one transmission for all its receivers; a base station sends to each by itself."""
+        return self.is_on_air and self.published == "broadcast" and self.medium != "lte"
+
+    @property
+    def has_queue(self) -> bool:
+        """Whether packets wait until the one before them is sent."""
+        return self.medium != "none" or self.rate_bps is not None or self.trace is not None
+
 
 LORA_LONGEST: Final = (222, 222, 115, 51, 51, 51)
 """Bytes that LoRaWAN allows by spreading factor 7 to 12 in Europe; recalled, unverified."""

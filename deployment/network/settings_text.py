@@ -119,8 +119,3 @@ def rule_ends(rule: LinkRule) -> str:
     if rule.channels is not None:
         ends += f" on {', '.join(rule.channels)}"
     return ends if rule.via is None else f"{ends} via {rule.via}"
-
-
-def sends_once(settings: Radio) -> bool:
-    """Whether a broadcast is one transmission for all its receivers."""
-    return settings.medium not in ("none", "wired", "lte") and settings.published == "broadcast"

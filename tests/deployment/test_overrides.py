@@ -1,14 +1,18 @@
 """Settings of a command line: where they go, what they may say, and that the text that results says the same."""
 
 from pathlib import Path
+from typing import get_origin
 
 import pytest
 
 from foosim.common import limits
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import apply_sets, load_deployment
+from foosim.deployment.network.rules import Network
+from foosim.deployment.overrides import NAMED
 from foosim.deployment.schema import Deployment
 from foosim.library.table.rod import RodRobot
+from foosim.world.component_types.settings import RobotSettings
 
 TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
 
@@ -55,6 +59,13 @@ def test_a_section_that_the_file_leaves_out_can_be_set() -> None:
     text = TABLE_TEXT[: TABLE_TEXT.index("\ndeadlines:")]
     assert load_deployment(apply_sets(text, "f", ["deadlines.start=5 s"]), "f").deadlines.start_ns == 5_000_000_000
     assert changed("clients.hand={lockstep: false}").clients["hand"].rate_hz is None
+
+
+def test_sections_whose_keys_are_names_open_no_new_one() -> None:
+    """`digests` and `kits` are written by foosim."""
+    fields = [*Deployment.model_fields.items(), *RobotSettings.model_fields.items(), *Network.model_fields.items()]
+    of_names = {key for key, field in fields if get_origin(field.annotation) is dict}
+    assert of_names - {"digests", "kits"} == NAMED - {"templates"}
 
 
 def test_a_new_name_with_dots_stands_in_quotes() -> None:

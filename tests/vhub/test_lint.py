@@ -256,7 +256,7 @@ def test_sensors_due_at_one_tick_that_overflow_a_queue_are_named(limits: str, of
         "network.links=[{id: thin, from: camera, to: '*', rate: 5 Mbit/s, overhead: 30 B, mtu: 250 B}]",
         f"network.links.thin.queue={{{limits}}}",
     ]
-    warned = [text for text in warnings_of(deployed(*sets)) if "packets of one tick that do not fit" in text]
+    warned = [text for text in warnings_of(deployed(*sets)) if "packets of one tick that overflow" in text]
     named = "camera ball to waver (560 B), camera other to waver (560 B)"
     assert len(warned) == is_crowded and all(text.startswith("thin: ") and named in text for text in warned)
     run = rehearse(TEXT, TABLE.name, 25, 1, [*sets])

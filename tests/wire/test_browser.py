@@ -32,6 +32,7 @@ PLAYER = {
     "robots": ROBOTS,
     "parameters": {"team": "red"},
 }
+BELOW = ("#camera", ".signs")
 LINK = ("camera", "player-red")
 STAT = "window.foosim.stat"
 WINDOW = 860, 480
@@ -427,7 +428,10 @@ def test_a_page_shows_captures_two_in_one_view_and_keeps_its_layout(browser: Pag
         branch(page)
         keep_the_layout(page, address)
     radio = tmp_path / "warehouse.mcap"
-    rehearse(WAREHOUSE.read_text(), WAREHOUSE.name, 50, 2, ["engine=pure"], capture=radio)
+    sets = ["engine=pure", "robots.rover01.sensors.eye={kind: camera, rate: 5 Hz}"]
+    rehearse(WAREHOUSE.read_text(), WAREHOUSE.name, 50, 2, sets, capture=radio)
     with served(lambda: open_sources(radio)) as address, looking(page, address):
         world_is_drawn(page)
         page.until(f"{STAT}.radio > 0")
+        menu, legend = (page.get(f"document.querySelector('{one}').getBoundingClientRect().toJSON()") for one in BELOW)
+        assert 0 < menu["top"] < menu["bottom"] <= legend["top"] < legend["bottom"], "the menu covers no legend"

@@ -6,7 +6,7 @@ the players that hear them, at an undeclared rate. Pure: used by `lint`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Final
@@ -14,7 +14,6 @@ from typing import Final
 from foosim.common.limits import FRAMES_MAX
 from foosim.deployment.network.impairments import Queue
 from foosim.deployment.network.link_settings import Profile, Profiles
-from foosim.deployment.network.settings_text import sends_once
 from foosim.deployment.schema import Deployment
 from foosim.vhub.network.mtu import frame_count, longest_of
 from foosim.world.component_types.per_field import payload_bytes
@@ -53,13 +52,7 @@ class Flow:
     @property
     def is_once_for_all(self) -> bool:
         """Whether the radio broadcasts it: it is sent once for all receivers."""
-        return self.channel != "" and sends_once(self.profile.settings)
-
-    @property
-    def queue_bytes(self) -> float:
-        """The greatest size of its queue; inf where packets do not wait."""
-        its = self.profile.settings
-        return its.queue.bytes_max if its.medium != "none" or its.rate_bps is not None or its.trace is not None else inf
+        return self.channel != "" and self.profile.settings.sends_once
 
 
 def flows_of(deployment: Deployment, profiles: Profiles) -> Iterator[Flow]:
@@ -91,12 +84,11 @@ def offered_hz(flows: Iterable[Flow]) -> dict[tuple[Key, bool], float]:
         (flow.key, flow.queue, "" if flow.is_once_for_all else flow.destination, flow.channel): flow for flow in flows
     }
     queues: dict[tuple[Key, bool], dict[str, float]] = {}
-    on_air: dict[tuple[Key, bool], bool] = {}
     for flow in once.values():
-        of_key = queues.setdefault(key := (flow.key, flow.is_once_for_all), {})
-        of_key[flow.queue] = of_key.get(flow.queue, 0.0) + flow.rate_hz * flow.frames
-        on_air[key] = flow.profile.settings.is_on_air
-    return {key: sum(rates.values()) if on_air[key] else max(rates.values()) for key, rates in queues.items()}
+        of_key = queues.setdefault((flow.key, flow.is_once_for_all), {})
+        queue = "" if flow.profile.settings.is_on_air else flow.queue
+        of_key[queue] = of_key.get(queue, 0.0) + flow.rate_hz * flow.frames
+    return {key: max(rates.values()) for key, rates in queues.items()}
 
 
 def long_packets(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str]:
@@ -105,7 +97,7 @@ def long_packets(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, str
     limits: dict[Key, str] = {}
     for flow in flows:
         settings = flow.profile.settings
-        in_queue, in_frames = flow.queue_bytes, longest_of(settings) or inf
+        in_queue, in_frames = settings.queue.bytes_max if settings.has_queue else inf, longest_of(settings) or inf
         limit = min(in_queue, in_frames)
         limits[flow.key] = (
             f"the queue of {in_queue} B"
@@ -127,28 +119,23 @@ def crowded_queues(deployment: Deployment, flows: Iterable[Flow]) -> dict[Key, s
     """Return a warning of sensors of a robot whose packets of one tick overflow a queue, by settings of links."""
     queues: dict[tuple[Key, str], tuple[Queue, dict[str, tuple[Schedule, int]]]] = {}
     for flow in flows:
-        _, sent = queues.setdefault((flow.key, flow.queue), (flow.profile.settings.queue, {}))
-        for channel, size in _sizes(deployment, flow) if flow.channel else ():
-            if size <= flow.queue_bytes < inf:
-                schedule = deployment.schedule(deployment.robots[flow.source].sensors[flow.channel])
-                to = "" if flow.is_once_for_all else f" to {flow.destination}"
-                sent[channel + to] = schedule, size + flow.profile.settings.overhead_bytes * flow.frames
+        its, to = flow.profile.settings, "" if flow.is_once_for_all else f" to {flow.destination}"
+        for channel, size in _sizes(deployment, flow) if flow.channel and its.has_queue else ():
+            schedule = deployment.schedule(deployment.robots[flow.source].sensors[flow.channel])
+            sent = queues.setdefault((flow.key, flow.queue), (its.queue, {}))[1]
+            sent[channel + to] = schedule, size + its.overhead_bytes * flow.frames
     texts: dict[Key, str] = {}
     for (key, _), (queue, sent) in queues.items():
-        due = {channel: size for channel, (_, size) in sent.items()}
-        for tick in range(TICKS if _overflows(queue, due) else 0):
-            due = {channel: size for channel, (schedule, size) in sent.items() if schedule.is_due(tick)}
-            if _overflows(queue, due):
-                limit = f"{queue.packets} packets" if len(due) > queue.packets else f"{queue.bytes_max} B"
+        most, room = queue.packets, queue.bytes_max
+        is_tight = len(sent) > most or sum(size for _, size in sent.values()) > room
+        for tick in range(TICKS if is_tight else 0):
+            due = {one: size for one, (its, size) in sent.items() if size <= room and its.is_due(tick)}
+            if len(due) > most or sum(due.values()) > room:
                 named = ", ".join(f"{channel} ({size} B)" for channel, size in due.items())
-                what = f"packets of one tick that do not fit into the queue of {limit} together are dropped: {named}"
+                what = f"packets of one tick that overflow the queue ({room} B, {most} packets) are dropped: {named}"
                 texts[key] = f"{what}; an offset of some of these sensors, smaller packets or a greater queue help"
                 break
     return texts
-
-
-def _overflows(queue: Queue, due: Mapping[str, int]) -> bool:
-    return len(due) > queue.packets or sum(due.values()) > queue.bytes_max
 
 
 def warnings_of(deployment: Deployment) -> list[str]:

@@ -17,7 +17,6 @@ from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairm
 from foosim.deployment.network.link_settings import NO_RADIO, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
-from foosim.deployment.network.settings_text import sends_once
 from foosim.deployment.network.traces import read_opportunities
 from foosim.deployment.schema import Deployment
 from foosim.deployment.validate_network import unheeded
@@ -188,14 +187,12 @@ def summaries(deployment: Deployment) -> list[LinkSummary]:
         warnings = [*summary.warnings, *phased.get(key, ()), *(of[key] for of in (too_long, crowded) if key in of)]
         if use.links == 0:
             warnings.append("no link uses it")
-        carried = {once: _capacity_hz(summary.broadcast if once else summary.carried) for once in (False, True)}
-        loads = {once: offered.get((key, once), 0.0) for once in carried}
-        busy = sum(load_hz / max(carried[once], 1e-9) for once, load_hz in loads.items())
+        loads_hz = offered.get((key, False), 0.0), offered.get((key, True), 0.0)
+        busy = loads_hz[0] / _capacity_hz(summary.carried) + loads_hz[1] / _capacity_hz(summary.broadcast)
         if busy > 1.0:
             which = "all together offer" if use.settings.is_on_air else "one sender offers"
-            load_hz = sum(loads.values())
-            what = f"{which} {load_hz:.0f} frames/s as declared"
-            warnings.append(f"{what}; of {SMALL_BYTES} B it carries {load_hz / busy:.3g}/s")
+            what = f"{which} {sum(loads_hz):.0f} frames/s as declared; of {SMALL_BYTES} B it carries"
+            warnings.append(f"{what} {sum(loads_hz) / busy:.3g}/s")
         found.append(replace(summary, warnings=tuple(warnings)))
     return found
 
@@ -205,7 +202,7 @@ def summary_of(use: SharedSettings, files: Mapping[str, bytes]) -> LinkSummary:
     settings = use.settings
     loss, burst_packets, burst_ns = residual_of(settings)
     mean_ns, sd_ns, p99_ns = delay_of(settings, files)
-    carried, is_slow = carried_of(settings, files), settings.medium == "wifi" and sends_once(settings)
+    carried, is_slow = carried_of(settings, files), settings.medium == "wifi" and settings.sends_once
     los_m, nlos_m = ranges_of(settings, use.heights_m)
     duty = settings.duty_cycle
     is_limited = settings.is_on_air and duty < 1.0 and carried
@@ -439,7 +436,7 @@ def _queue_ns(settings: Radio, carried: Sequence[Throughput]) -> int | None:
 
 
 def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
-    settings, has_queue = use.settings, "queue" in use.settings.model_fields_set
+    settings = use.settings
     if summary.loss > 0.5:
         yield f"more than half of all packets is lost: {100.0 * summary.loss:.1f} %"
     if settings.ttl_ns is not None and summary.delay_mean_ns > settings.ttl_ns:
@@ -458,7 +455,7 @@ def _warnings(use: SharedSettings, summary: LinkSummary) -> Iterator[str]:
             yield f"{key} {unused}"
     if summary.carried and settings.queue.bytes_max < summary.carried[-1].size:
         yield f"a packet of {summary.carried[-1].size} B does not fit into the queue of {settings.queue.bytes_max} B"
-    if settings.medium == "none" and settings.rate_bps is None and settings.trace is None and has_queue:
+    if not settings.has_queue and "queue" in settings.model_fields_set:
         yield "the queue has no effect: no rate, no medium"
     if use.rule == NO_RADIO:
         yield "these endpoints have no radio in common, or not that of their rule: nothing passes (no_route)"
@@ -469,7 +466,7 @@ def _capacity_hz(carried: Sequence[Throughput]) -> float:
         return inf
     small = carried[0]
     bps = small.goodput_bps if small.shared_bps is None else max(small.goodput_bps, small.shared_bps)
-    return bps / 8.0 / small.size
+    return max(bps, 1) / 8.0 / small.size
 
 
 # --- the phase between sensor and player: where both act at fixed times, it adds to the delay of every packet ---------

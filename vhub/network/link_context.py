@@ -69,8 +69,3 @@ class LinkSetup:
     def shared(self) -> Radio:
         """The settings for broadcasts, which no rule of a single receiver changes."""
         return self.settings if self.own is None else self.own
-
-    @property
-    def sends_once(self) -> bool:
-        """Whether a broadcast is sent once for all its receivers; a base station sends to each by itself."""
-        return self.is_radio and self.settings.published == "broadcast" and self.settings.medium != "lte"

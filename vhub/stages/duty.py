@@ -45,7 +45,7 @@ class Duty(Stage):
         self._settings, self._shared, self._sender = setup.settings, setup.shared, setup.sender
         self._window_ns = setup.settings.duty_window_ns
         self._allowed_ns = allowed_ns(setup.settings.duty_cycle, self._window_ns)
-        self._broadcasts = setup.sends_once
+        self._broadcasts = setup.settings.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Duty | None:

@@ -86,7 +86,7 @@ class Seen:
 
     @property
     def is_broadcast(self) -> bool:
-        return self.row.published and self.setup.sends_once
+        return self.row.published and self.setup.settings.sends_once
 
     def out_of_service(self, endpoint: str) -> str:
         """Return that an endpoint's body is out of service, and which body where it is another's."""

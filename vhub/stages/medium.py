@@ -129,7 +129,7 @@ class OnAir(Stage):
         self._sender: RadioState = setup.sender
         self._budget: Budget = setup.budget
         self._air: Air = setup.air
-        self._once, self._factor = setup.sends_once, setup.settings.spreading_factor
+        self._once, self._factor = setup.settings.sends_once, setup.settings.spreading_factor
         self._window_ns = setup.settings.duty_window_ns if setup.settings.duty_cycle < 1.0 else 0
 
     def at_sending(self, flight: Flight) -> str:

@@ -43,13 +43,11 @@ class Queue(Stage):
     def __init__(self, setup: LinkSetup) -> None:
         self._sender = setup.sender
         self._own, self._shared = Limits(setup.settings), Limits(setup.shared)
-        self._broadcasts = setup.sends_once
+        self._broadcasts = setup.settings.sends_once
 
     @classmethod
     def for_link(cls, setup: LinkSetup) -> Queue | None:
-        settings = setup.settings
-        served = settings.medium != "none" or settings.rate_bps is not None or settings.trace is not None
-        return cls(setup) if served else None
+        return cls(setup) if setup.settings.has_queue else None
 
     def at_sending(self, flight: Flight) -> str:
         sender = self._sender

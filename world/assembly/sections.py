@@ -11,7 +11,6 @@ from foosim.world.fixed_scenery import kits_of, scene_shapes
 from foosim.world.matter.physics import Physics, physics_from
 from foosim.world.spec import WorldSpec
 
-STANDARD_GRAVITY: Final = 9.80665
 RESTITUTION_NS: Final = 10_000_000
 """The longest substep with a rebound within 5 %; at 40 ms it has 3 % too much energy, at 100 ms 18 %."""
 NO_SURFACE: Final = ""

@@ -82,7 +82,7 @@ def undrawn_content(problem: str) -> bytes:
 
 
 def undrawn_meshes(files: Mapping[str, bytes]) -> list[str]:
-    """Return a line with the reason for each drawn form without triangles among files."""
+    """Return a line for each drawn form among files without triangles, with the reason."""
     drawn = [msgspec.msgpack.decode(files[path], type=_Drawn) for path in sorted(files) if undrawn_path(path)]
     return [f"a visual is not drawn, {one.problem}" for one in drawn if one.problem]
 

@@ -18,7 +18,7 @@ export class Eye {
     this.choice = select([["", "No camera"]], "", { id: "camera", "aria-label": "Look through a camera", onchange: () => this._turn() });
     this.frame = h("figure", { id: "eye", hidden: true }, this.picture, this.problem);
     this.box = h("div", { id: "eye-box", hidden: true }, this.frame, this.choice);
-    place.append(this.box);
+    place.prepend(this.box);
     this.shown = "";
     this.asking = false;
     store.on("scene", (source) => source.info.id === 0 && this._fill(source.scene.cameras ?? []));

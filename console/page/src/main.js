@@ -88,7 +88,7 @@ new Comparison(store);
 const log = new Log(store);
 const view = makeView();
 const bar = new ViewBar(options, changedOption, () => view.home());
-new Eye(connection, store, byId("over"));
+new Eye(connection, store, byId("corner"));
 
 function makeView() {
   const has3d = document.createElement("canvas").getContext("webgl2") !== null;

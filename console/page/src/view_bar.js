@@ -36,10 +36,10 @@ export class ViewBar {
       this.changed("two");
     } });
     bar.append(this.two);
-    this.owners = h("div", { class: "legend owners", id: "owners" });
+    this.owners = h("div", { class: "legend owners", id: "owners", hidden: true });
     this.scale = h("span", { class: "legend" }, "loss 0 %", h("i", { style: `background:${lossGradient()}` }), "100 %", h("i", { class: "wall" }), "wall in the way");
     this.signs = h("div", { class: "legend signs", hidden: true }, this.scale, h("span", {}, "✕ packet dropped"));
-    byId("view").append(this.owners, this.signs);
+    byId("corner").append(this.owners, this.signs);
   }
 
   /** @param {string} name */
