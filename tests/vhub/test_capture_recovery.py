@@ -182,7 +182,7 @@ def assert_whole(path: Path, whole: Path, last: int = LAST) -> None:
     assert read_by_others(files_from(path)[-1]) > 0
 
 
-@pytest.mark.parametrize("closed", [0, 9, EPOCH_AT, LAST])
+@pytest.mark.parametrize("closed", [0, EPOCH_AT, LAST])
 def test_a_restarted_vhub_writes_what_is_missing_wherever_it_was_killed(
     chunked: bytes,
     parts: Path,

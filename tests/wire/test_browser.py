@@ -36,7 +36,7 @@ BELOW = ("#camera", ".signs")
 LINK = ("camera", "player-red")
 STAT = "window.foosim.stat"
 WINDOW = 860, 480
-REFRESH_HZ = 5.0
+REFRESH_HZ = 3.0
 CHEAP = "--disable-gpu-compositing"
 """Where a GPU is software, the page around the view costs less without it."""
 DRIVER = "GL Driver Message (OpenGL, Performance"
@@ -197,7 +197,8 @@ def add_and_move(page: Page) -> None:
     page.fill("#add-x", "9")
     page.click("dialog [type=submit]")
     page.until("document.querySelector('dialog .wrong').textContent.includes('outside of the table')")
-    page.fill("#add-x", "0.2")
+    page.fill("#add-x", "0.5")
+    page.fill("#add-y", "0.2")  # where no figure comes
     send(page)
     page.until(f"{STAT}.absent === 0 && !document.querySelector('.entities .absent')")
     assert page.colours() > SHAPES

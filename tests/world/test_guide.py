@@ -72,7 +72,7 @@ USES: Final[Mapping[str, Use]] = {
 RUNS: Final = (("powers.py", "low_pass.py"), ("laps.py", "service.py"), ("omni.py",), ("yards.py",))
 """The examples whose worlds differ; those of one deployment are in one world, where each breaks laws as alone."""
 FORCED: Final = "engine=pure"
-TICKS: Final = {"deploy/table.yaml": 120, "deploy/warehouse.yaml": 20, "yard.yaml": 100}
+TICKS: Final = {"deploy/table.yaml": 60, "deploy/warehouse.yaml": 20, "yard.yaml": 50}
 
 
 def guides() -> str:
