@@ -62,7 +62,7 @@ class Taker(NamedTuple):
             values = self._named(command) if isinstance(command, Mapping) else self._ordered(command)
             command = codec.kind(**values)
         if self.joints and _is_several(codec):
-            numbers = getattr(command, codec.fields[0].name)  # what is no row is refused when it is packed
+            numbers = getattr(command, codec.fields[0].name)  # refused when it is packed, if it is a number
             if isinstance(numbers, Sized) and len(numbers) != len(self.joints):
                 raise self._of_another_length(numbers)
         return command

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Self
 
 
-class Closable:
+class Closable(ABC):
     """Base of what has `close`: leaving its `with` calls it."""
 
+    @abstractmethod
     def close(self) -> object:
         """End it; a second call does nothing."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self

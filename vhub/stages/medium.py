@@ -398,7 +398,7 @@ class Contending(OnAir):
 
     def _access(self, flight: Flight, broadcast: bool, size: int, number: int, lost: int | None) -> tuple[Access, int]:
         """Return access and airtime of one frame of a packet."""
-        raise NotImplementedError
+        return super().access(flight, broadcast, (size,), lost)
 
 
 class WiFi(Contending):
