@@ -108,12 +108,3 @@ def check_new(path: Path) -> None:
     """Raise CaptureError when a file exists at the path of a capture, or where it would continue."""
     for found in parts_at(path).values():
         raise CaptureError(f"{found}: exists already; a capture is never overwritten")
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring the names of a folder's files to the disk; raises OSError."""
-    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        os.fsync(opened)
-    finally:
-        os.close(opened)

@@ -25,7 +25,6 @@ from foosim.capture.contents import (
     VERSIONS,
     check_new,
     declare_topics,
-    sync_folder,
     write_all,
 )
 from foosim.capture.foxglove import LOG, POSES, SCENE, View
@@ -33,6 +32,7 @@ from foosim.capture.left import Progress, find_left, progress
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.mcap.writer import McapWriter
+from foosim.capture.new_file import sync_folder, written
 from foosim.capture.parts import END_METADATA, METADATA, NEXT, files_from, head_of, part_path, parts_at
 from foosim.capture.rows import (
     EPOCHS,
@@ -173,17 +173,14 @@ class CaptureFile:
         elif isinstance(item, Line):
             self._write_view(LOG, item.tick, self._view.log_line(item.level, item.text, item.tick))
         elif isinstance(item, Epoch):
-            self._write_epoch(item)
+            self._add_row(EPOCHS, item.tick, epoch_row(item))
+            self.done.epoch = item.epoch
         elif self._has(item.frame.tick):
             self._pass(item)
             return False
         else:
             self._write_tick(item)
         return True
-
-    def _write_epoch(self, epoch: Epoch) -> None:
-        self._add_row(EPOCHS, epoch.tick, epoch_row(epoch))
-        self.done.epoch = epoch.epoch
 
     def _add_row(self, topic: str, tick: int, row: Row) -> None:
         at_ns = tick * self._tick_ns
@@ -522,24 +519,15 @@ def one_file(out: Path, described: Described) -> Iterator[CaptureFile]:
 
     Raises Failed when it cannot be written; nothing of it stays then.
     """
-    part = out.with_name(f".{out.name}.part")
     capture = described.deployment.capture.model_copy(update=ONE_FILE)
     described = replace(described, deployment=described.deployment.model_copy(update={"capture": capture}))
-    with suppress(OSError):
-        part.unlink()
-    try:
-        file = CaptureFile(part, described)
-    except CaptureError as error:
-        raise Failed(str(error)) from None
-    try:
+    with written(out) as part:
+        part.unlink(missing_ok=True)
+        try:
+            file = CaptureFile(part, described)
+        except CaptureError as error:
+            raise Failed(str(error)) from None
         try:
             yield file
         finally:
             file.close()
-        part.rename(out)
-        sync_folder(out.parent)
-    except OSError as error:
-        raise Failed(f"{out}: cannot be written, {error.strerror}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()

@@ -43,16 +43,33 @@ def new_file(out: Path) -> Iterator[Path]:
     Raises Existing, and Failed when it cannot be written.
     """
     check_absent(out)
+    with written(out) as part:
+        yield part
+
+
+@contextmanager
+def written(out: Path) -> Iterator[Path]:
+    """Give the name to write to, as `new_file` does; the file replaces another one. Raises Failed."""
     part = _part(out)
     try:
         yield part
         part.rename(out)
+        sync_folder(out.parent)
     except OSError as error:
         raise _failed(out, error) from None
     finally:
         rmtree(part, ignore_errors=True)
         with suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names of a folder's files to the disk; raises OSError."""
+    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)
 
 
 def _part(out: Path) -> Path:

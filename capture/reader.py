@@ -171,8 +171,10 @@ class Scan:
                 yield content
             else:
                 self._take(content)
-        if not checked and not file.finished:
-            self._check_cut(file)
+        about = self.about
+        is_described = file.is_checked and about.metadata and about.deployment_text
+        if not (checked or file.finished or is_described) and file.profile in ("", PROFILE):
+            raise CaptureError(f"{self._path}: the capture is cut off before its first row")
         self._check(file)
         self.about.library = file.library
         self.about.finished = file.finished and NEXT not in self.about.end
@@ -199,12 +201,6 @@ class Scan:
             raise CaptureError(f"{self._path}: the capture has no deployment")
         if not file.is_checked:
             raise CaptureError(f"{self._path}: the capture lacks its metadata {CHECKS!r}")
-
-    def _check_cut(self, file: Joined) -> None:
-        """Refuse a file without rows that ends amid what describes it."""
-        is_described = file.is_checked and self.about.metadata and self.about.deployment_text
-        if file.profile in ("", PROFILE) and not is_described:
-            raise CaptureError(f"{self._path}: the capture is cut off before its first row")
 
     def _take(self, content: records.Metadata | records.Attachment) -> None:
         about = self.about

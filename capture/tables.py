@@ -77,11 +77,6 @@ _UNITS: Final[Mapping[str, str]] = {
 """By the last word of a column's name."""
 
 
-def unit_of(name: str) -> str:
-    """Return the unit by the ending of a name."""
-    return _UNITS.get(name.rpartition("_")[2], "")
-
-
 def table_names() -> list[str]:
     """Return the names of the tables, the most used first."""
     rows = [topic.removeprefix("/") for topic in ROW_TYPES]
@@ -119,7 +114,9 @@ def _columns(kind: type[Row]) -> tuple[Column, ...]:
     info = inspect.type_info(kind)
     assert isinstance(info, inspect.StructType)
     return tuple(
-        Column(field.name, _KINDS.get(type(plain_type(field.type)), "json"), unit_of(field.name))
+        Column(
+            field.name, _KINDS.get(type(plain_type(field.type)), "json"), _UNITS.get(field.name.rpartition("_")[2], "")
+        )
         for field in info.fields
     )
 

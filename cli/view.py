@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
@@ -16,7 +15,7 @@ from foosim.capture.reader import read_about
 from foosim.cli.capture.options import reading
 from foosim.client.client import Client
 from foosim.client.client import connect as join
-from foosim.client.control import Control, connect, pki_of
+from foosim.client.control import connect, pki_of
 from foosim.client.replay_listener import hear_replay
 from foosim.common.addresses import LOOPBACK
 from foosim.common.errors import BadValue, Refused
@@ -88,7 +87,7 @@ def view(  # noqa: PLR0913, PLR0917  # a command's options
     """
     offset_ns = read_offset(second, offset)
     options = ServeOptions(listen, certificate, key, view_only, open_browser, announce)
-    if what and is_recording(what):
+    if what and ("/" in what or Path(what).suffix or Path(what).exists()):  # else it is the name of a run
         if view_only:
             raise BadValue("--view-only is valid for a live run only; a recording cannot be changed", what)
         with reading():
@@ -99,11 +98,6 @@ def view(  # noqa: PLR0913, PLR0917  # a command's options
     serve_sources(sources, options)
 
 
-def is_recording(what: str) -> bool:
-    """Whether a capture, a table of poses or a replay is meant, and not the name of a run."""
-    return "/" in what or bool(Path(what).suffix) or Path(what).exists()
-
-
 def open_run_sources(
     run: str | None, second: Path | None = None, offset_ns: int = 0, *, view_only: bool = False
 ) -> list[Source]:
@@ -112,12 +106,7 @@ def open_run_sources(
     Raises NoRun, BadValue, BadPoses, and what a request to the run raises.
     """
     name = find_run(run).name
-
-    def viewing(give_up: Callable[[], bool]) -> Control:
-        return connect(name, "viewer", give_up)
-
-    def operating(give_up: Callable[[], bool]) -> Control:
-        return connect(name, "operator", give_up)
+    viewing, operating = partial(connect, name, "viewer"), partial(connect, name, "operator")
 
     def joining(endpoint: str) -> Client:
         info = find_run(name).info()

@@ -120,19 +120,14 @@ def parse(text: object, dimension: Dimension) -> Fraction:
         raise BadValue(dimension.refusal, text)
     number, unit = match[1], match[2]
     if unit not in dimension.units:
-        other = None if unit is None else _other_dimension(unit, dimension)
-        if other is not None:
-            raise BadValue(f"{dimension.refusal}; {unit} measures {other.one}", text)
+        # Dimensions are equal by their base unit, so MHz is one of a rate, too.
+        for other in [one for one in globals().values() if isinstance(one, Dimension) and unit in one.units]:
+            if other.base not in dimension.units:
+                raise BadValue(f"{dimension.refusal}; {unit} measures {other.one}", text)
         close = (dimension.usual or dimension.base) if unit is None else _nearest_unit(unit, dimension)
         nearest = None if close is None else repr(f"{number} {close}")
         raise BadValue(dimension.refusal, text, nearest)
     return Fraction(number) * dimension.units[unit]
-
-
-def _other_dimension(unit: str, dimension: Dimension) -> Dimension | None:
-    """Return the dimension of a foreign unit. Dimensions are equal by their base unit, so MHz is one of a rate, too."""
-    others = [other for other in globals().values() if isinstance(other, Dimension) and unit in other.units]
-    return next((other for other in others if other.base not in dimension.units), None)
 
 
 def _nearest_unit(unit: str, dimension: Dimension) -> str | None:

@@ -27,12 +27,11 @@ from foosim.world.scene import Quaternion, Vector, conjugate, drawn, enclosing, 
 from foosim.world.spec import WorldSpec
 
 OVERVIEW: Final = "overview"
-FROM: Final[Vector] = (-0.36, -0.48, 0.8)
-"""The direction from the middle of the world to the eye of an overview, of length 1."""
+WAY: Final[Vector] = (0.36, 0.48, -0.8)
+"""The direction in which an overview looks, of length 1."""
 FAR: Final = 4.0
 """How far an overview sees, in its distances from the middle."""
 FOV_ABOVE: Final = 0.6
-UP: Final[Vector] = (0.0, 0.0, 1.0)
 DOWN: Final[Quaternion] = (-0.5, 0.5, 0.5, 0.5)
 """Looks straight down, with the world's x to the right and its y up."""
 GROUND_M: Final = 0.05
@@ -85,15 +84,13 @@ class Overview:
 
     def __init__(self, spec: WorldSpec, layout: Layout, width: int, height: int, *, is_above: bool = False) -> None:
         """Raises AssetError without a mesh of the world."""
-        fov, way, self._turned = DEFAULT_FOV, FROM, towards(moved((0.0, 0.0, 0.0), FROM, -1.0))
-        if is_above:
-            fov, way, self._turned = FOV_ABOVE, UP, DOWN
+        fov, way, self._turned = (FOV_ABOVE, (0.0, 0.0, -1.0), DOWN) if is_above else (DEFAULT_FOV, WAY, towards(WAY))
         low, high = _shown(spec, layout)
         middle = moved(moved(low, low, -0.5), high, 0.5)
         corners = product((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))
         seen = [rotate(conjugate(self._turned), moved(corner, middle, -1.0)) for corner in corners]
         away = max([max(abs(y), abs(z) * width / height) / tan(fov / 2.0) - x for x, y, z in seen])
-        self._eye = moved(middle, way, away)
+        self._eye = moved(middle, way, -away)
         optics = Optics(width, height, fov, 0.01 * away, FAR * away, samples=2)
         self.pictures: Final = Pictures(spec, PictureSource(optics, ("image",), OVERVIEW), OVERVIEW, OVERVIEW)
         self._in_view = InView(optics, looks_of(mounting_of(spec, layout, layout.entities[0])))

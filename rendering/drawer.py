@@ -92,10 +92,12 @@ class Drawer:
         count = SUBFRAMES if optics.exposure > 0.0 and speeds.any() else 1
         lens = lens_of(optics) if any(optics.distortion) else None
         margin = (0, 0) if lens is None else lens.margin
-        n, view = optics.samples, _view(optics, margin, position, orientation)
+        n = optics.samples
         is_mean = n * count > 1
         shape = optics.height + 2 * margin[1], optics.width + 2 * margin[0], 3
         colour = np.zeros(shape, np.uint16 if is_mean else np.uint8)
+        focal = focal_length(optics.fov, optics.width) * n
+        view = view_of(position, orientation, focal, shape[1] * n, shape[0] * n, optics.near, optics.far)
         for earlier in range(1 - count, 1):
             moved = advanced(poses, speeds, earlier * optics.exposure / count)
             frame = self._frame(view, optics, numbers, moved)
@@ -227,14 +229,6 @@ class Drawer:
         m = view.matrix
         clip = np.stack([m[i] * x + m[i + 1] * y + m[i + 2] * z + m[i + 3] for i in (0, 4, 8)], axis=2)
         return facing_at(clip, model.facing[corners], place[triangles], *_centres(view, pixels))
-
-
-def _view(optics: Optics, margin: tuple[int, int], position: Vector, orientation: Quaternion) -> View:
-    """Return the view of a camera's samples at a pose, with more columns and rows at each side."""
-    n = optics.samples
-    width, height = (optics.width + 2 * margin[0]) * n, (optics.height + 2 * margin[1]) * n
-    focal = focal_length(optics.fov, optics.width) * n
-    return view_of(position, orientation, focal, width, height, optics.near, optics.far)
 
 
 def _words(colours: Picture) -> NDArray[np.uint32]:

@@ -22,7 +22,6 @@ SHARES: Final = 64
 """Pixels are mixed in steps of 1/64: three colours, times 64 x 64, fit one word of 64 bits."""
 HALF: Final = np.uint64(SHARES * SHARES // 2 * (1 + (1 << 20) + (1 << 40)))
 
-
 Number = TypeVar("Number", np.float32, np.int32)
 
 
@@ -46,7 +45,8 @@ class Lens:
             miss = np.abs(x * radial + aside - seen_x) + np.abs(y * radial + down - seen_y)
             out_x, out_y = (np.abs(a) * focal - 0.5 * size for a, size in ((x, optics.width), (y, optics.height)))
             is_seen = (miss * focal < CLOSE) & (out_x < optics.width // 2) & (out_y < optics.height // 2)
-        self.margin = _margin(out_x[is_seen]), _margin(out_y[is_seen])
+        x_most, y_most = (int(out[is_seen].max(initial=0.0)) for out in (out_x, out_y))
+        self.margin = x_most + 2, y_most + 2
         self._width, height = optics.width + 2 * self.margin[0], optics.height + 2 * self.margin[1]
         place = [
             np.floor((np.where(is_seen, a, 0.0) * focal + 0.5 * size - 0.5) * SHARES + 0.5).astype(np.int64)
@@ -80,11 +80,6 @@ class Lens:
         return made
 
 
-def _margin(out: Floats) -> int:
-    """Return how many pixels are added at a side for places that are outside by these."""
-    return int(out.max(initial=0.0)) + 2
-
-
 def _distortion(x: Floats, y: Floats, optics: Optics) -> tuple[Floats, Floats, Floats]:
     """Return the radial factor and the offsets of a place (x, y), per focal length."""
     k1, k2, p1, p2, k3 = optics.distortion
@@ -96,13 +91,9 @@ def _distortion(x: Floats, y: Floats, optics: Optics) -> tuple[Floats, Floats, F
 lens_of = lru_cache(8)(Lens)
 
 
-def _quantiles() -> Floats:
-    """Return 256 equally likely values of the standard normal distribution."""
-    lower = inverse_of_lower_half((np.arange(128, dtype=np.float64) + 0.5) / 256.0)
-    return np.concatenate([lower, -lower[::-1]])
-
-
-QUANTILES: Final = _quantiles()
+_LOWER: Final = inverse_of_lower_half((np.arange(128, dtype=np.float64) + 0.5) / 256.0)
+QUANTILES: Final = np.concatenate([_LOWER, -_LOWER[::-1]])
+"""256 equally likely values of the standard normal distribution."""
 KEY_BYTES: Final = 32
 
 

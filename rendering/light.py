@@ -74,13 +74,9 @@ def sky(view: View) -> NDArray[np.uint32]:
     return np.asarray(SKY.take((height * np.float32(256.0) + np.float32(256.0)).astype(np.int16), mode="clip"))
 
 
-def _sky() -> NDArray[np.uint32]:
-    """Return the colours of directions by (1 + their part along z) * 256."""
-    made = np.zeros((513, 4), np.uint8)
-    share = np.arange(257, dtype=np.float32)[:, np.newaxis] / np.float32(256.0)
-    made[256:, :3] = HORIZON + (ZENITH - HORIZON) * share + np.float32(0.5)
-    made[:256, :3] = BELOW
-    return made.view(np.uint32).reshape(-1)
-
-
-SKY: Final = _sky()
+_SHARES: Final = np.arange(257, dtype=np.float32)[:, np.newaxis] / np.float32(256.0)
+_COLOURS: Final = np.zeros((513, 4), np.uint8)
+_COLOURS[256:, :3] = HORIZON + (ZENITH - HORIZON) * _SHARES + np.float32(0.5)
+_COLOURS[:256, :3] = BELOW
+SKY: Final = _COLOURS.view(np.uint32).reshape(-1)
+"""The colours of directions by (1 + their part along z) * 256."""

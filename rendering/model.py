@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foosim.common.errors import Malformed
 from foosim.kernels.raster import Floats, Ints, runs
-from foosim.rendering.tessellation import corners_of, distinct
+from foosim.rendering.tessellation import corners_of
 from foosim.world.components.optics import moving_links
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Layout
@@ -70,7 +70,7 @@ class Model:
         """The first vertex, triangle and part of each moving link, and the ends."""
         self._local = np.concatenate([*[part.vertices for part in building.parts], np.zeros((0, 6))]).T.copy()
         self.world = np.ascontiguousarray(self._local[:3].T)
-        self.facing = _facing(self._local[3:])
+        self.facing = _dot(self._local[3:], SUN)
         self.triangles = np.concatenate(
             [*[part.triangles for part in building.parts], np.zeros((0, 3), np.int32)], dtype=np.int32
         )
@@ -157,7 +157,7 @@ class _Building:
                 )
             rows.append(corners.T + 0.0)
             colours.append((shape.colour, len(corners.T) // 3))
-        vertices, triangles = distinct(np.concatenate(rows))
+        vertices, triangles = np.unique(np.concatenate(rows), axis=0, return_inverse=True)
         low, high = vertices[:, :3].min(axis=0), vertices[:, :3].max(axis=0)
         middle = (low + high) * 0.5
         x, y, z = (vertices[:, :3] - middle).T
@@ -220,7 +220,3 @@ def _moved(place: Floats | list[float], points: Floats) -> Floats:
 def _dot(columns: Floats, vector: Vector) -> Floats:
     x, y, z = columns
     return np.asarray(x * vector[0] + y * vector[1] + z * vector[2])
-
-
-def _facing(normals: Floats) -> Floats:
-    return _dot(normals, SUN)

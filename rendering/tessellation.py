@@ -35,7 +35,9 @@ def corners_of(geometry: Geometry) -> Corners:
         return _mesh(geometry)
     if isinstance(geometry, Hull):
         return _mesh(geometry.mesh)
-    radius, sides = geometry.radius, _sides(geometry.radius)
+    radius = geometry.radius
+    fine = [sides for sides in SIDES if radius * (1.0 - _inner(sides) * _inner(sides)) <= FLAT_M]
+    sides = (*fine, SIDES[-1])[0]
     c, s = _circle(sides)
     if isinstance(geometry, Cylinder):
         outer, half = radius * 2.0 / (1.0 + _inner(sides)), geometry.length / 2
@@ -51,12 +53,6 @@ def corners_of(geometry: Geometry) -> Corners:
     normals = np.concatenate([_pairs(low), [[[1.0, 0.0]] * 2] if half else np.zeros((0, 2, 2)), _pairs(high)])
     low, high = low * outer - (0.0, half), high * outer + (0.0, half)
     return _turned(_pairs(np.concatenate([low, high] if half else [low, high[1:]])), normals, c, s)
-
-
-def _sides(radius: float) -> int:
-    """Return how many sides a circle has."""
-    fine = (sides for sides in SIDES if radius * (1.0 - _inner(sides) * _inner(sides)) <= FLAT_M)
-    return next(fine, SIDES[-1])
 
 
 def _circle(sides: int) -> Corners:
@@ -116,7 +112,7 @@ def _mesh(mesh: Mesh) -> Corners:
     u, v = positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0]
     areas = np.stack([u[:, i - 2] * v[:, i - 1] - u[:, i - 1] * v[:, i - 2] for i in range(3)], axis=1)
     faces = _unit(areas)
-    _, place = distinct(mesh.vertices)
+    _, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
     corner = place[mesh.triangles].reshape(-1)
     order = np.argsort(corner, kind="stable")
     counts = np.bincount(corner)
@@ -129,16 +125,6 @@ def _mesh(mesh: Mesh) -> Corners:
     here, there = here[smooth], there[smooth]
     sums = [np.bincount(here, areas[there // 3, i], len(corner)) for i in range(3)]
     return positions, _unit(np.stack(sums, axis=1)).reshape(-1, 3, 3)
-
-
-def distinct(rows: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the different ones of rows, in a fixed order, and the place of each row among them."""
-    order = np.lexsort(rows.T)
-    is_first = np.ones(len(rows), np.bool_)
-    (rows[order[1:]] != rows[order[:-1]]).any(axis=1, out=is_first[1:])
-    place = np.empty(len(rows), np.intp)
-    place[order] = np.cumsum(is_first) - 1
-    return rows[order[is_first]], place
 
 
 def _unit(vectors: Floats) -> Floats:

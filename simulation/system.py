@@ -221,7 +221,9 @@ class System:
             arrival_ns = bus.next_ns()
             free_ns = min([process.busy_until_ns for process in self._behind.values()]) if self._behind else NEVER_NS
             if self._timers and self._timers[0][0] <= min(free_ns, arrival_ns, self._soonest_ns):
-                self._go_off()
+                due_ns, _, action = heappop(self._timers)
+                bus.now_ns = max(bus.now_ns, due_ns)
+                self.soon(action)
             elif free_ns <= arrival_ns and free_ns <= self._soonest_ns:
                 bus.now_ns = max(bus.now_ns, free_ns)
                 self._catch_up()
@@ -446,11 +448,6 @@ class System:
         """Call `action` when some virtual time has passed."""
         self._boots += 1
         heappush(self._timers, (self.bus.now_ns + after_ns, self._boots, action))
-
-    def _go_off(self) -> None:
-        due_ns, _, action = heappop(self._timers)
-        self.bus.now_ns = max(self.bus.now_ns, due_ns)
-        self.soon(action)
 
     def _enter_clients(self) -> None:
         """Add the players of the deployment and the lockstep clients of the rehearsal."""

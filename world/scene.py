@@ -372,7 +372,7 @@ def swept_box(body: Body) -> tuple[Vector, Vector]:
             continue
         low, high = enclosing(boxes)
         if link.joint == "prismatic":
-            low, high = enclosing([_slid(low, high, link.axis, way) for way in link.limits])
+            low, high = enclosing([(moved(low, link.axis, way), moved(high, link.axis, way)) for way in link.limits])
         elif link.joint in MOVING:
             low, high = _revolved(low, high, link.axis)
         if link.joint != "free":
@@ -386,10 +386,6 @@ def swept_box(body: Body) -> tuple[Vector, Vector]:
 
 def moved(point: Vector, direction: Vector, way: float) -> Vector:
     return point[0] + way * direction[0], point[1] + way * direction[1], point[2] + way * direction[2]
-
-
-def _slid(low: Vector, high: Vector, axis: Vector, way: float) -> tuple[Vector, Vector]:
-    return moved(low, axis, way), moved(high, axis, way)
 
 
 def _turned(low: Vector, high: Vector, orientation: Quaternion) -> tuple[Vector, Vector]:

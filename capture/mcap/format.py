@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 import sys
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from io import BytesIO
@@ -276,7 +276,9 @@ class McapFile:
         elif opcode == Opcode.METADATA:
             metadata = read_metadata(content)
             if metadata.name == CHECKS:
-                self._check_described(metadata.metadata)
+                if self._crc is None:
+                    raise ValueError(f"metadata {CHECKS!r} follow a chunk")
+                self._described.check(metadata.metadata, self._crc)
             yield metadata
         elif opcode == Opcode.ATTACHMENT:
             attachment = read_attachment(content)
@@ -287,11 +289,6 @@ class McapFile:
             self.profile, self.library = header.profile, header.library
         elif opcode == Opcode.FOOTER:
             self._end(self._stream.read(len(MAGIC) + 1))
-
-    def _check_described(self, written: Mapping[str, str]) -> None:
-        if self._crc is None:
-            raise ValueError(f"metadata {CHECKS!r} follow a chunk")
-        self._described.check(written, self._crc)
 
     def _declare(self, content: bytes) -> None:
         channel = records.Channel.read(_stream(content))

@@ -24,7 +24,7 @@ def status_at(recording: Recording, account: Mapping[str, Any], tick: int, look:
     """Return the status at a tick with the view `look`; `account` is the state of the clock."""
     about, deployment = recording.about, recording.deployment
     first, last = recording.span
-    epoch = recording.epoch_at(tick)
+    epoch = next((epoch for epoch in reversed(recording.epochs) if epoch.tick <= tick), None)
     owners = {} if epoch is None else {owner.robot: owner.node for owner in epoch.owners}
     roster = sorted(deployment.nodes) if epoch is None else epoch.roster
     frame = None if look is None else look.frame

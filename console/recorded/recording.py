@@ -6,7 +6,6 @@ captured last before it holds. `Look.kind` is which.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isnan
@@ -205,8 +204,3 @@ class Recording:
             if number < 0 or places.log_ns[number] != tick * self.tick_ns:
                 raise CaptureError(f"{self.path}: tick {tick} is missing")
             yield captured_tick(self.row(TICK, number))
-
-    def epoch_at(self, tick: int) -> EpochRow | None:
-        """Return the owners from a tick on."""
-        number = bisect_right(self.epochs, tick, key=lambda epoch: epoch.tick) - 1
-        return self.epochs[number] if number >= 0 else None

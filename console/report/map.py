@@ -6,7 +6,6 @@ Places are x, y in m, in the world frame.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping
 from itertools import groupby
 from math import isnan
 from operator import itemgetter
@@ -124,20 +123,15 @@ class MapMaker:
     def take_loss(self, row: PacketRow) -> None:
         """Take a dropped packet."""
         self._counts[row.source, row.destination, row.cause] += 1
-        places = self._places_at(row.sent_ns)
+        # Those of the last captured frame at or before, or of the first one that is kept.
+        first = self._frames[0][1] if self._frames else {}
+        places = next((places for at_ns, places in reversed(self._frames) if at_ns <= row.sent_ns), first)
         ends = [places[end] for end in (row.source, row.destination) if end in places]
         if not ends:
             self._placeless += 1
             return
         at = sum(x for x, _ in ends) / len(ends), sum(y for _, y in ends) / len(ends)
         self._losses.add(Loss(at, row.cause, row.source, row.destination, row.sent_ns))
-
-    def _places_at(self, time_ns: int) -> Mapping[str, Place]:
-        """Return the places in the last captured frame at or before a time, or in the first one that is kept."""
-        for at_ns, places in reversed(self._frames):
-            if at_ns <= time_ns:
-                return places
-        return self._frames[0][1] if self._frames else {}
 
     def result(self) -> dict[str, Any]:
         """Return the map: `tracks` of bodies, `standing` endpoints without a body, `losses`, the `lost` packets,

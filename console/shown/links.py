@@ -235,11 +235,6 @@ def _pair(source: str, destination: str) -> Pair:
     return (source, destination) if source <= destination else (destination, source)
 
 
-def lost_where(cause: str) -> str:
-    """Return at which end of its link, or on the way, a packet is lost by a cause."""
-    return "sender" if cause in AT_SENDER else "receiver" if cause in AT_RECEIVER else "way"
-
-
 def links_message(
     at: int, window_s: float, in_all: int, links: list[dict[str, Any]], drops: Iterable[tuple[Key, str, int]]
 ) -> dict[str, Any]:
@@ -247,10 +242,10 @@ def links_message(
     lost: Counter[tuple[str, str, str]] = Counter()
     for (source, destination, _), cause, count in drops:
         lost[source, destination, cause] += count
-    shown = [
-        {"from": source, "to": destination, "cause": cause, "where": lost_where(cause), "count": count}
-        for (source, destination, cause), count in lost.items()
-    ]
+    shown = []
+    for (source, destination, cause), count in lost.items():
+        where = "sender" if cause in AT_SENDER else "receiver" if cause in AT_RECEIVER else "way"
+        shown.append({"from": source, "to": destination, "cause": cause, "where": where, "count": count})
     return {"type": "links", "at": at, "window_s": window_s, "in_all": in_all, "links": links, "drops": shown}
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import pi
 from typing import Annotated, Final
 
-import numpy as np
 from msgspec import Meta, Struct
 from pydantic import Field
 
@@ -17,12 +16,9 @@ from foosim.common.units import Quantity
 from foosim.world.component_types.quantities import Metres
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.beams import Beams, BeamsTogether
-from foosim.world.components.rows import Rows
-from foosim.world.components.view import Mounting, View
+from foosim.world.components.beams import Beams, BeamSensor
+from foosim.world.components.view import Mounting
 from foosim.world.placing import FIRST_LINK, MountedAt
-from foosim.world.rays.boxes import Floats
 from foosim.world.scene import Vector
 
 RAYS_MAX: Final = 1081
@@ -62,44 +58,15 @@ class Scan(Struct, frozen=True):
 
 
 @sensor("laser_scanner", LaserScannerSettings, Scan, array_length="rays", shown_as="foxglove.LaserScan")
-class LaserScanner(Sensor):
+class LaserScanner(BeamSensor):
     """The distance to the first thing on each beam other than the robot's own body; the range for none."""
 
     def __init__(self, settings: LaserScannerSettings, at: Mounting) -> None:
         self.least_m, self.range_m = settings.least, settings.range
         self.beams = Beams(at, settings.at, list(directions(settings.rays, settings.angle)), settings.range)
 
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and the greatest distance (m); a beam that meets nothing has the greatest."""
-        return {"distances": (min(self.least_m, self.range_m), self.range_m)}
-
-    def sample(self, view: View) -> Scan:
-        return Scan(tuple(LaserScanners([self]).sample(view)[0].tolist()))
-
-    @staticmethod
-    def together(sensors: Sequence[LaserScanner]) -> LaserScanners:
-        """Return these as one; all have as many beams."""
-        return LaserScanners(sensors)
-
-    @staticmethod
-    def rays(sensors: Sequence[LaserScanner], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each beam: from the mount to the first thing, or as far as the sensor reaches."""
-        far = np.array([[one.range_m] for one in sensors])
-        return BeamsTogether([one.beams for one in sensors]).ends(numbers, np.zeros_like(far), far)
-
-
-class LaserScanners(Rows):
-    """Several of them, with as many beams."""
-
-    def __init__(self, sensors: Sequence[LaserScanner]) -> None:
-        self._beams = BeamsTogether([one.beams for one in sensors])
-        self._least = np.array([one.least_m for one in sensors])[:, None]
-        self._ranges = np.array([one.range_m for one in sensors])[:, None]
-
-    def sample(self, view: View) -> Floats:
-        """Return the distances (m), of shape (sensors, beams)."""
-        found: Floats = np.minimum(np.maximum(self._beams.distances(view), self._least), self._ranges)
-        return found
+    def reading(self, distances: list[float]) -> Scan:
+        return Scan(tuple(distances))
 
 
 def step_of(rays: int, angle: float) -> float:

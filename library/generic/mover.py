@@ -16,17 +16,15 @@ from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity, custom_error
 from foosim.library.generic.path import Path, Point, path_at_speed, path_of
 from foosim.library.mobile.arcs import Floats, shorter, upright_turn
-from foosim.library.mobile.vehicles import HULL, Height, KinematicModel, Radius, Speed
+from foosim.library.mobile.vehicles import HULL, FreeMotion, Height, KinematicModel, Radius, Speed
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
-from foosim.world.components.base import Motion
 from foosim.world.components.entities import MotionMounting, Motors
 from foosim.world.components.view import Mounting, WritableView
 from foosim.world.layout import Entity
 from foosim.world.matter.materials import UNKNOWN, Radio
 from foosim.world.moving.columns import EntityColumns
-from foosim.world.moving.free_way import FreeWay
 from foosim.world.moving.upright import Upright
 from foosim.world.placing import Coordinate, Turn
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, Sphere
@@ -132,26 +130,7 @@ class MoverRobot(RobotSettings):
         return self.length or across, self.width or across, self.height or across
 
 
-STATE: Final = ("position", "orientation", "linear_velocity", "angular_velocity", "heading", "blocked")
-"""The fields that this motion writes."""
-
-
-class _Batch:
-    """Things that one node moves in a tick."""
-
-    def __init__(
-        self, at: MotionMounting, way: FreeWay, state: EntityColumns, clock: EntityColumns, entities: Sequence[Entity]
-    ) -> None:
-        self.entities = list(entities)
-        self.state = state.of(entities)
-        self.clock = clock.of(entities)
-        self.movers = way.movers(entities)
-        robots = [at.spec.robots[entity.name] for entity in entities]
-        self.paths = [its.as_path() for its in robots if isinstance(its, MoverRobot)]
-        assert len(self.paths) == len(robots), "the motion track moves entities with a path"
-
-
-class Track(Motion):
+class Track(FreeMotion):
     """Along a path in time, and waiting while something is in the way; `clock` is the time on the path (s).
 
     The clock of a path is a slot. Where an obstacle is in the way (`moving.free_way`) it runs less, by halves, and
@@ -159,28 +138,32 @@ class Track(Motion):
     """
 
     slots: ClassVar = {"clock": 1}
+    fields: ClassVar = (*BODY, "heading", "blocked")
 
     def __init__(self, at: MotionMounting) -> None:
-        self._at = at
         self._tick_s = at.spec.tick_ns / 1e9
-        self._way = FreeWay(at)
-        self._state = EntityColumns(at, STATE)
-        self._clock = EntityColumns(at, ("clock",))
-        self._batch = _Batch(at, self._way, self._state, self._clock, at.entities)
+        self._clocks = EntityColumns(at, ("clock",))
+        super().__init__(at)
+
+    def take(self, entities: Sequence[Entity]) -> None:
+        """Keep their paths, and the columns of the times on them."""
+        super().take(entities)
+        self._clock = self._clocks.of(entities)
+        robots = [self.at.spec.robots[entity.name] for entity in entities]
+        self._paths = [its.as_path() for its in robots if isinstance(its, MoverRobot)]
+        assert len(self._paths) == len(robots), "the motion track moves entities with a path"
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: WritableView) -> None:
         """Advance these things by a tick; they have no motors."""
-        if self._batch.entities != entities:
-            self._batch = _Batch(self._at, self._way, self._state, self._clock, entities)
-        batch, tick_s = self._batch, self._tick_s
-        state, clocks = batch.state.read_at_start(view), batch.clock.read_at_start(view)[:, 0].tolist()
+        tick_s = self._tick_s
+        state, near = self.start(entities, view)
+        clocks = self._clock.read_at_start(view)[:, 0].tolist()
 
         def poses(shares: Floats) -> Floats:
-            each = zip(batch.paths, clocks, shares.tolist(), strict=True)
+            each = zip(self._paths, clocks, shares.tolist(), strict=True)
             return np.array([path.at(path.after(clock, tick_s * share)) for path, clock, share in each])
 
         start, full = state[:, 0:3], poses(np.ones(len(entities)))
-        near = self._way.near(batch.movers, view)
         moves = (full[:, 0:3] != start).any(axis=1)
         shares, is_stopped = near.free_share(start, lambda shares: poses(shares)[:, 0:3], moves)
         after = poses(shares) if is_stopped.any() else full
@@ -189,9 +172,9 @@ class Track(Motion):
         new[:, 0:3], new[:, 5], new[:, 6], new[:, 13] = after[:, 0:3], z, w, shorter(after[:, 3])
         new[:, 7:10], new[:, 12] = (after[:, 0:3] - start) / tick_s, shorter(after[:, 3] - state[:, 13]) / tick_s
         new[:, 14] = is_stopped
-        batch.state.write(view, new)
-        each = zip(batch.paths, clocks, shares.tolist(), strict=True)
-        batch.clock.write(view, np.array([[path.after(clock, tick_s * share)] for path, clock, share in each]))
+        self.state.write(view, new)
+        each = zip(self._paths, clocks, shares.tolist(), strict=True)
+        self._clock.write(view, np.array([[path.after(clock, tick_s * share)] for path, clock, share in each]))
 
 
 @model(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 from msgspec import Struct
@@ -10,8 +9,9 @@ from msgspec import Struct
 from foosim.world.component_types.quantities import Metres, Radians
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor, need
-from foosim.world.components.view import SlotReadings, View
+from foosim.world.components.base import need
+from foosim.world.components.rows import SlotSensor
+from foosim.world.components.view import Mounting
 
 
 class PoseSettings(SensorSettings):
@@ -29,16 +29,11 @@ class Pose(Struct, frozen=True):
 
 
 @sensor("pose", PoseSettings, Pose, shown_as="foxglove.PoseInFrame")
-class PoseTracker(Sensor):
+class PoseTracker(SlotSensor):
     """Place and heading in the world frame."""
 
     position, heading = need(), need()
+    reading: ClassVar = Pose
 
-    def sample(self, view: View) -> Pose:
-        x, y, _ = view.read(self.position)
-        return Pose(x, y, view.numbers[self.heading.at])
-
-    @staticmethod
-    def together(sensors: Sequence[PoseTracker]) -> SlotReadings:
-        """Return these as one."""
-        return SlotReadings([(one.position.at, one.position.at + 1, one.heading.at) for one in sensors])
+    def __init__(self, settings: PoseSettings, at: Mounting) -> None:
+        self.places = (*self.position.places[:2], self.heading.at)

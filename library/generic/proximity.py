@@ -6,11 +6,9 @@ and pass the robot's own body. A distance counts from where a ray leaves the las
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import pi
 from typing import Annotated, Final
 
-import numpy as np
 from msgspec import Meta, Struct
 from pydantic import Field
 
@@ -20,11 +18,9 @@ from foosim.common.units import Quantity
 from foosim.world.component_types.quantities import Metres
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.beams import Beams, BeamsTogether, body_of, hull_middle, mounted_at, way_out
-from foosim.world.components.rows import Rows
-from foosim.world.components.view import Mounting, View
-from foosim.world.rays.boxes import Floats
+from foosim.world.components.beams import Beams, BeamSensor, hull_middle, mounted_at, way_out
+from foosim.world.components.mounted import body_at
+from foosim.world.components.view import Mounting
 
 Range = Annotated[float, Quantity(units.LENGTH, "1 cm", "100 m")]
 RAYS_MAX: Final = 128
@@ -47,51 +43,19 @@ class Ranges(Struct, frozen=True):
 
 
 @sensor("proximity", ProximitySettings, Ranges, array_length="rays")
-class Proximity(Sensor):
+class Proximity(BeamSensor):
     """The free way from the hull along each ray; the sensor's range where nothing is hit."""
 
+    field = "ways"
+
     def __init__(self, settings: ProximitySettings, at: Mounting) -> None:
-        link = body_of(at).links[0]
+        link = body_at(at).links[0]
         middle = hull_middle(link)
         turns = [2.0 * pi * ray / settings.rays for ray in range(settings.rays)]
         directions = [(cos(turn), sin(turn), 0.0) for turn in turns]
         self.hull_m = [way_out(link, middle, direction) for direction in directions]
-        """How far it is from the middle to the hull, along each ray."""
         self.range_m = settings.range
         self.beams = Beams(at, mounted_at(middle), directions, settings.range + max(self.hull_m))
 
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and the greatest way (m); a ray that meets nothing has the greatest."""
-        return {"ways": (0.0, self.range_m)}
-
-    def sample(self, view: View) -> Ranges:
-        return Ranges(tuple(ProximityBatch([self]).sample(view)[0].tolist()))
-
-    @staticmethod
-    def together(sensors: Sequence[Proximity]) -> ProximityBatch:
-        """Return these as one; all have as many rays."""
-        return ProximityBatch(sensors)
-
-    @staticmethod
-    def rays(sensors: Sequence[Proximity], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each ray: from a robot's hull to the first thing, or as far as the sensor reaches.
-
-        All have as many rays.
-        """
-        hulls = np.array([one.hull_m for one in sensors])
-        farthest = hulls + np.array([[one.range_m] for one in sensors])
-        return BeamsTogether([one.beams for one in sensors]).ends(numbers, hulls, farthest)
-
-
-class ProximityBatch(Rows):
-    """Several of them, with as many rays."""
-
-    def __init__(self, sensors: Sequence[Proximity]) -> None:
-        self._beams = BeamsTogether([one.beams for one in sensors])
-        self._hulls = np.array([one.hull_m for one in sensors])
-        self._ranges = np.array([[one.range_m] for one in sensors])
-
-    def sample(self, view: View) -> Floats:
-        """Return the free ways (m), of shape (sensors, rays)."""
-        found: Floats = np.minimum(np.maximum(self._beams.distances(view) - self._hulls, 0.0), self._ranges)
-        return found
+    def reading(self, distances: list[float]) -> Ranges:
+        return Ranges(tuple(distances))

@@ -16,8 +16,7 @@ from foosim.common.units import Quantity
 from foosim.world.component_types.quantities import Metres
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.beams import Beams, BeamsTogether
+from foosim.world.components.beams import Beams, BeamSensor, BeamsTogether
 from foosim.world.components.view import Mounting, View
 from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
@@ -50,33 +49,22 @@ class Distance(Struct, frozen=True):
 
 
 @sensor("range", RangeSettings, Distance)
-class RangeFinder(Sensor):
+class RangeFinder(BeamSensor):
     """The distance to the nearest that one beam, or a cone of 13, meets, the robot's own body aside."""
+
+    field = "distance"
 
     def __init__(self, settings: RangeSettings, at: Mounting) -> None:
         self.least_m, self.range_m = settings.least, settings.range
         self.beams = Beams(at, settings.at, list(directions(settings.cone)), settings.range)
 
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and the greatest distance (m); where nothing is met it is the greatest."""
-        return {"distance": (min(self.least_m, self.range_m), self.range_m)}
-
-    def sample(self, view: View) -> Distance:
-        return Distance(float(RangeFinders([self]).sample(view)[0, 0]))
+    def reading(self, distances: list[float]) -> Distance:
+        return Distance(*distances)
 
     @staticmethod
     def together(sensors: Sequence[RangeFinder]) -> RangeFinders:
         """Return these as one."""
         return RangeFinders(sensors)
-
-    @staticmethod
-    def rays(sensors: Sequence[RangeFinder], numbers: Sequence[float]) -> Floats:
-        """Return both ends of each beam: from the mount to the first thing, or as far as the sensor reaches."""
-        found = []
-        for one in sensors:  # some have a cone, others a beam
-            far = np.array([[one.range_m]])
-            found.append(BeamsTogether([one.beams]).ends(numbers, np.zeros_like(far), far))
-        return np.concatenate(found)
 
 
 class RangeFinders:

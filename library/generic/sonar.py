@@ -7,7 +7,7 @@ Siegel, "Physically based simulation model for acoustic sensor robot navigation"
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar, Final, Self
+from typing import Annotated, Final, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -17,11 +17,10 @@ from foosim.common.errors import BadValue
 from foosim.common.exact_math import cos, hypot
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
-from foosim.library.generic.range import Distance, RangeFinder, directions
+from foosim.library.generic.range import Distance, directions
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
-from foosim.world.components.beams import Beams, BeamsTogether
+from foosim.world.components.beams import Beams, BeamSensor, BeamsTogether
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import Mounting, View
 from foosim.world.placing import FIRST_LINK, MountedAt
@@ -58,25 +57,21 @@ class SonarSettings(SensorSettings):
 
 
 @sensor("sonar", SonarSettings, Distance)
-class Sonar(Sensor):
+class Sonar(BeamSensor):
     """The distance to the nearest echo other than that of the robot's own body; the range without one."""
 
-    rays: ClassVar[Any] = staticmethod(RangeFinder.rays)
+    field = "distance"
 
     def __init__(self, settings: SonarSettings, at: Mounting) -> None:
-        self.dead_zone_m, self.range_m, self.least_cosine = settings.dead_zone, settings.range, cos(settings.incidence)
+        self.least_m, self.range_m, self.least_cosine = settings.dead_zone, settings.range, cos(settings.incidence)
         beams = list(directions(settings.cone, CIRCLES))
         self.beams = Beams(at, settings.at, beams, settings.range)
         self.with_beside = Beams(
             at, settings.at, [one for way in beams for one in _with_two_beside(way)], settings.range
         )
 
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Return the least and the greatest distance (m); without an echo it is the greatest."""
-        return {"distance": (self.dead_zone_m, self.range_m)}
-
-    def sample(self, view: View) -> Distance:
-        return Distance(float(Sonars([self]).sample(view)[0, 0]))
+    def reading(self, distances: list[float]) -> Distance:
+        return Distance(*distances)
 
     @staticmethod
     def together(sensors: Sequence[Sonar]) -> Sonars:
@@ -91,7 +86,7 @@ class Sonars(Rows):
         self._beams = BeamsTogether([one.with_beside for one in sensors])
         self._ways = np.array([one.with_beside.directions for one in sensors])
         self._dead_zones, self._ranges, self._cosines = np.array(
-            [(one.dead_zone_m, one.range_m, one.least_cosine) for one in sensors]
+            [(one.least_m, one.range_m, one.least_cosine) for one in sensors]
         ).T.copy()
 
     def sample(self, view: View) -> Floats:

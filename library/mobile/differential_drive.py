@@ -2,64 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import ClassVar, Final
 
 import numpy as np
 
 from foosim.common.exact_math import atan2
-from foosim.library.mobile.arcs import Arcs, Floats, along_arcs, approached
+from foosim.library.mobile.arcs import Floats, along_arcs, approached
 from foosim.library.mobile.differential import DifferentialDriveRobot, rigid_body
 from foosim.library.mobile.set_points import set_points_of
-from foosim.library.mobile.vehicles import VehicleModel
+from foosim.library.mobile.vehicles import FreeMotion, VehicleModel
 from foosim.library.mobile.wheels import WheelMotors, Wheels, slips_of, wheels_of
 from foosim.library.rigid.primitives import RIGID
 from foosim.world.component_types.descriptions import BODY, JOINTS
 from foosim.world.component_types.registry import model
-from foosim.world.components.base import Model, Motion
-from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.base import Model
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, Slot, WritableView
 from foosim.world.layout import Entity
-from foosim.world.moving.columns import EntityColumns
-from foosim.world.moving.free_way import FreeWay
 from foosim.world.scene import Body, Colour, moved, rotate
 
 BLUE: Final[Colour] = (0.15, 0.35, 0.75, 1.0)
 GREEN: Final[Colour] = (0.15, 0.55, 0.35, 1.0)
 WHEELS: Final = {"heading": 1, "wheel_speeds": 2, "wheel_travel": 2}
 """The heading of a robot, the speeds of its rims, and how far its wheels have turned."""
-
-
-STATE: Final = (
-    "position",
-    "orientation",
-    "linear_velocity",
-    "angular_velocity",
-    "heading",
-    "wheel_speeds",
-    "wheel_travel",
-    "blocked",
-)
-"""The fields that this motion writes."""
 STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0))
 
 
-class _Batch:
-    """Robots that one node moves in a tick."""
-
-    def __init__(
-        self, way: FreeWay, state: EntityColumns, wheels: Mapping[int, Wheels], entities: Sequence[Entity]
-    ) -> None:
-        """`wheels` are by the entities' indices."""
-        self.entities = list(entities)
-        self.state = state.of(entities)
-        self.movers = way.movers(entities, is_level=True)
-        its = [wheels[entity.index] for entity in entities]
-        self.track = np.array([one.track for one in its])
-        self.rolls = np.array([[1.0 - one.slips[0], 1.0 - one.slips[1]] for one in its])
-
-
-class WheeledMotion(Motion):
+class WheeledMotion(FreeMotion):
     """Along arcs, as far as nothing is in the way.
 
     A wheel approaches the target speed with at most the drive's acceleration and rolls a little less far than it turns.
@@ -68,60 +38,43 @@ class WheeledMotion(Motion):
     blocked, with its wheels slipping.
     """
 
+    fields: ClassVar = (*BODY, *WHEELS, "blocked")
+    is_level: ClassVar = True
     takes_arrays: ClassVar = True
 
-    def __init__(self, at: MotionMounting) -> None:
-        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
-        self._substeps = at.spec.substeps
-        self._way = FreeWay(at)
-        self._state = EntityColumns(at, STATE)
-        self._wheels = {entity.index: wheels_of(at.spec, at.layout, entity) for entity in at.entities}
-        self._batch = self._batch_of(at.entities)
-
-    def _batch_of(self, entities: Sequence[Entity]) -> _Batch:
-        return _Batch(self._way, self._state, self._wheels, entities)
+    def take(self, entities: Sequence[Entity]) -> None:
+        """Keep their tracks, and how far each wheel rolls for what it turns."""
+        super().take(entities)
+        its = [wheels_of(self.at.spec, self.at.layout, entity) for entity in entities]
+        self._track = np.array([one.track for one in its])
+        self._rolls = np.array([[1.0 - one.slips[0], 1.0 - one.slips[1]] for one in its])
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors] | Floats, view: WritableView) -> None:
         """Advance these robots by a tick; of each wheel the target speed (m/s) and greatest acceleration (m/s2)."""
-        if self._batch.entities != entities:
-            self._batch = self._batch_of(entities)
-        batch, dt, count = self._batch, self._dt, len(entities)
-        state = batch.state.read_at_start(view)
+        dt, count = self.dt, len(entities)
+        state, near = self.start(entities, view)
         place, heading = state[:, 0:3].copy(), state[:, 13].copy()
         speeds, travel = state[:, 14:16].copy(), state[:, 16:18].copy()
         set_points = set_points_of(motors, STANDING)
         targets, rates = set_points[:, :, 0], set_points[:, :, 1]
-        near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
-        for _ in range(self._substeps):
+        for _ in range(self.substeps):
             speeds = approached(speeds, targets, rates * dt)
             travel = travel + speeds * dt
-            ground = speeds * batch.rolls
-            ahead, turned = (ground[:, 0] + ground[:, 1]) / 2.0, (ground[:, 1] - ground[:, 0]) / batch.track * dt
+            ground = speeds * self._rolls
+            ahead, turned = (ground[:, 0] + ground[:, 1]) / 2.0, (ground[:, 1] - ground[:, 0]) / self._track * dt
             ways = np.zeros((count, 3))
             arcs = along_arcs(ahead * dt, 0.0, turned, heading)
             ways[:, 0], ways[:, 1], heading = arcs.x, arcs.y, arcs.heading
             place, shares, stops = near.free_way(place, ways)
             is_stopped |= stops
-        _write(batch, view, place, arcs, ahead * shares, turned / dt, (speeds, travel, is_stopped))
-
-
-def _write(
-    batch: _Batch,
-    view: WritableView,
-    place: Floats,
-    arcs: Arcs,
-    ahead: Floats,
-    turn_rate: Floats,
-    rest: tuple[Floats, Floats, Floats],
-) -> None:
-    state = np.zeros((len(place), batch.state.width))
-    z, w = arcs.turn_z, arcs.turn_w
-    state[:, 0:3], state[:, 5], state[:, 6] = place, z, w
-    state[:, 7], state[:, 8] = ahead * (1.0 - 2.0 * z * z), ahead * (2.0 * z * w)
-    state[:, 12], state[:, 13] = turn_rate, arcs.heading
-    state[:, 14:16], state[:, 16:18], state[:, 18] = rest
-    batch.state.write(view, state)
+        z, w = arcs.turn_z, arcs.turn_w
+        ahead, after = ahead * shares, np.zeros((count, self.state.width))
+        after[:, 0:3], after[:, 5], after[:, 6] = place, z, w
+        after[:, 7], after[:, 8] = ahead * (1.0 - 2.0 * z * z), ahead * (2.0 * z * w)
+        after[:, 12], after[:, 13] = turned / dt, arcs.heading
+        after[:, 14:16], after[:, 16:18], after[:, 18] = speeds, travel, is_stopped
+        self.state.write(view, after)
 
 
 class RigidDifferentialDrive(Model):

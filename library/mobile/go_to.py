@@ -15,10 +15,9 @@ from foosim.world.component_types.quantities import JobNumber, Metres
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
 from foosim.world.components.base import need, slot
-from foosim.world.components.entities import Motors
+from foosim.world.components.entities import Motors, made_model
 from foosim.world.components.view import IncompatibleComponent, Mounting, View, WritableView
 from foosim.world.moving.progress import Approach, Patience
-from foosim.world.moving.upright import made_model
 from foosim.world.placing import FAR_M
 
 

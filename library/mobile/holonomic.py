@@ -10,21 +10,12 @@ import numpy as np
 from foosim.common.spec_base import default
 from foosim.library.mobile.arcs import along_arcs, approached, approached_together
 from foosim.library.mobile.set_points import set_points_of
-from foosim.library.mobile.vehicles import (
-    Acceleration,
-    Speed,
-    TurnRate,
-    Vehicle,
-    VehicleModel,
-)
+from foosim.library.mobile.vehicles import Acceleration, FreeMotion, Speed, TurnRate, Vehicle, VehicleModel
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
-from foosim.world.components.base import Motion
-from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity
-from foosim.world.moving.columns import EntityColumns
-from foosim.world.moving.free_way import FreeWay
 from foosim.world.scene import Colour
 
 TEAL: Final[Colour] = (0.10, 0.55, 0.55, 1.0)
@@ -43,29 +34,10 @@ class HolonomicRobot(Vehicle):
     turn_rate: TurnRate = default("180 deg/s")
 
 
-STATE: Final = (
-    "position",
-    "orientation",
-    "linear_velocity",
-    "angular_velocity",
-    "heading",
-    "base_velocity",
-    "blocked",
-)
-"""The fields that this motion writes."""
 STANDING: Final[Motors] = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 
 
-class _Batch:
-    """Bases that one node moves in a tick."""
-
-    def __init__(self, way: FreeWay, state: EntityColumns, entities: Sequence[Entity]) -> None:
-        self.entities = list(entities)
-        self.state = state.of(entities)
-        self.movers = way.movers(entities, is_level=True)
-
-
-class HolonomicMotion(Motion):
+class HolonomicMotion(FreeMotion):
     """In any direction, along arcs, as far as nothing is in the way.
 
     The velocity in the base's own frame approaches its set-point: the vector in the plane with at most one
@@ -73,12 +45,8 @@ class HolonomicMotion(Motion):
     the way (`moving.free_way`); it turns where it is blocked.
     """
 
-    def __init__(self, at: MotionMounting) -> None:
-        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
-        self._substeps = at.spec.substeps
-        self._way = FreeWay(at)
-        self._state = EntityColumns(at, STATE)
-        self._batch = _Batch(self._way, self._state, at.entities)
+    fields: ClassVar = (*BODY, "heading", "base_velocity", "blocked")
+    is_level: ClassVar = True
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: WritableView) -> None:
         """Advance these bases by a tick.
@@ -86,16 +54,13 @@ class HolonomicMotion(Motion):
         Motors are three: the speeds ahead and to the left (m/s), and turning left (rad/s), each with the greatest
         acceleration (m/s2, rad/s2); that of the first holds for the vector of the first two.
         """
-        if self._batch.entities != entities:
-            self._batch = _Batch(self._way, self._state, entities)
-        batch, dt, count = self._batch, self._dt, len(entities)
-        state = batch.state.read_at_start(view)
+        dt, count = self.dt, len(entities)
+        state, near = self.start(entities, view)
         place, heading, velocity = state[:, 0:3].copy(), state[:, 13].copy(), state[:, 14:17].copy()
         set_points = set_points_of(motors, STANDING)
         targets, rates = set_points[:, :, 0], set_points[:, :, 1]
-        near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
-        for _ in range(self._substeps):
+        for _ in range(self.substeps):
             velocity[:, 0:2] = approached_together(velocity[:, 0:2], targets[:, 0:2], rates[:, 0] * dt)
             velocity[:, 2] = approached(velocity[:, 2], targets[:, 2], rates[:, 2] * dt)
             turned = velocity[:, 2] * dt
@@ -107,11 +72,11 @@ class HolonomicMotion(Motion):
         z, w = arcs.turn_z, arcs.turn_w
         s, c = 2.0 * z * w, 1.0 - 2.0 * z * z
         ahead, left = velocity[:, 0] * shares, velocity[:, 1] * shares
-        after = np.zeros((count, batch.state.width))
+        after = np.zeros((count, self.state.width))
         after[:, 0:3], after[:, 5], after[:, 6] = place, z, w
         after[:, 7], after[:, 8] = ahead * c - left * s, ahead * s + left * c
         after[:, 12], after[:, 13], after[:, 14:17], after[:, 17] = velocity[:, 2], heading, velocity, is_stopped
-        batch.state.write(view, after)
+        self.state.write(view, after)
 
 
 @model(

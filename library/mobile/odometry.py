@@ -5,15 +5,15 @@ It includes the slip of the wheels, and their turning while the rover was blocke
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import ClassVar
 
 from msgspec import Struct
 
 from foosim.world.component_types.quantities import Metres
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor, need
-from foosim.world.components.view import SlotReadings, View
+from foosim.world.components.base import need
+from foosim.world.components.rows import SlotSensor
 
 
 class OdometrySettings(SensorSettings):
@@ -28,15 +28,8 @@ class WheelTravel(Struct, frozen=True):
 
 
 @sensor("odometry", OdometrySettings, WheelTravel)
-class Odometry(Sensor):
+class Odometry(SlotSensor):
     """Travel of the left and the right wheel's rim since the start."""
 
     wheel_travel = need()
-
-    def sample(self, view: View) -> WheelTravel:
-        return WheelTravel(*view.read(self.wheel_travel))
-
-    @staticmethod
-    def together(sensors: Sequence[Odometry]) -> SlotReadings:
-        """Return these as one."""
-        return SlotReadings([one.wheel_travel.places for one in sensors])
+    reading: ClassVar = WheelTravel

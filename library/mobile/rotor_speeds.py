@@ -15,7 +15,7 @@ from foosim.library.mobile.rotors import QuadrotorRobot
 from foosim.world.component_types.quantities import RadiansPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator, slot
+from foosim.world.components.base import SetPointActuator, slot
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.view import Mounting, View, WritableView
 
@@ -33,7 +33,7 @@ class RotorSpeeds(Struct, frozen=True):
 
 
 @actuator("rotor_speeds", RotorSpeedsSettings, RotorSpeeds, needs=("angular_velocity",))
-class RotorSpeedsActuator(Actuator):
+class RotorSpeedsActuator(SetPointActuator):
     """Rotors that keep the speeds of the last command."""
 
     _set_point = slot(4)
@@ -52,10 +52,6 @@ class RotorSpeedsActuator(Actuator):
         """Take the speeds of all rotors."""
         view.write(self._set_point, *command.speeds)
         return True
-
-    def hold(self, view: WritableView) -> None:
-        """Stop the rotors."""
-        view.write(self._set_point, 0.0, 0.0, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
         """Turn the rotors unequally, for the run that compares engines."""

@@ -16,6 +16,7 @@ from foosim.library.mobile.set_points import set_points_of
 from foosim.library.mobile.vehicles import (
     Acceleration,
     Antenna,
+    FreeMotion,
     Height,
     Radius,
     Speed,
@@ -25,12 +26,9 @@ from foosim.library.mobile.vehicles import (
 )
 from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
-from foosim.world.components.base import Motion
-from foosim.world.components.entities import MotionMounting, Motors
+from foosim.world.components.entities import Motors
 from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity
-from foosim.world.moving.columns import EntityColumns
-from foosim.world.moving.free_way import FreeWay
 from foosim.world.scene import Colour
 
 WHITE: Final[Colour] = (0.90, 0.90, 0.92, 1.0)
@@ -56,8 +54,6 @@ class RotorcraftRobot(Vehicle):
     ceiling: Ceiling = default("120 m")
 
 
-STATE: Final = ("position", "orientation", "linear_velocity", "angular_velocity", "heading", "arrived", "blocked")
-"""The fields that this motion writes."""
 NO_GOAL: Final[Motors] = ((0.0, 0.0),) * 4
 EACH: Final = 0.7071067811865476
 """Which share of the acceleration each of both takes, over the ground and in height: together they have all of it."""
@@ -65,19 +61,7 @@ ARRIVED_M: Final = 1e-6
 """A rotorcraft that is nearer to its waypoint is there: far above rounding."""
 
 
-class _Batch:
-    """Rotorcraft that one node moves in a tick."""
-
-    def __init__(self, at: MotionMounting, way: FreeWay, state: EntityColumns, entities: Sequence[Entity]) -> None:
-        self.entities = list(entities)
-        self.state = state.of(entities)
-        self.movers = way.movers(entities)
-        robots = [at.spec.robots[entity.name] for entity in entities]
-        self.acceleration = np.array([its.acceleration for its in robots if isinstance(its, RotorcraftRobot)])
-        assert len(self.acceleration) == len(robots), "the motion rotorcraft moves rotorcraft"
-
-
-class RotorcraftMotion(Motion):
+class RotorcraftMotion(FreeMotion):
     """To a waypoint, within limits of speed, climb and acceleration, as far as nothing is in the way.
 
     Over the ground and in height the speed that is wanted is the greatest from which a body that moves in steps of dt
@@ -91,13 +75,14 @@ class RotorcraftMotion(Motion):
     that was left to it.
     """
 
-    def __init__(self, at: MotionMounting) -> None:
-        self._at = at
-        self._dt = at.spec.tick_ns / 1e9 / at.spec.substeps
-        self._substeps = at.spec.substeps
-        self._way = FreeWay(at)
-        self._state = EntityColumns(at, STATE)
-        self._batch = _Batch(at, self._way, self._state, at.entities)
+    fields: ClassVar = (*BODY, "heading", "arrived", "blocked")
+
+    def take(self, entities: Sequence[Entity]) -> None:
+        """Keep their accelerations."""
+        super().take(entities)
+        robots = [self.at.spec.robots[entity.name] for entity in entities]
+        self._acceleration = np.array([its.acceleration for its in robots if isinstance(its, RotorcraftRobot)])
+        assert len(self._acceleration) == len(robots), "the motion rotorcraft moves rotorcraft"
 
     def move(self, entities: Sequence[Entity], motors: Sequence[Motors], view: WritableView) -> None:
         """Advance these rotorcraft by a tick.
@@ -105,20 +90,17 @@ class RotorcraftMotion(Motion):
         Motors are four: x, y and z (m) and the heading (rad) to come to, each with the greatest speed there; none of
         one without a waypoint, which brakes.
         """
-        if self._batch.entities != entities:
-            self._batch = _Batch(self._at, self._way, self._state, entities)
-        batch, dt, count = self._batch, self._dt, len(entities)
-        state = batch.state.read_at_start(view)
+        dt, count = self.dt, len(entities)
+        state, near = self.start(entities, view)
         place, velocity, heading = state[:, 0:3].copy(), state[:, 7:10].copy(), state[:, 13].copy()
         set_points = set_points_of(motors, NO_GOAL)
         has_goal = np.array([bool(its) for its in motors])
         goal, most = np.where(has_goal[:, None], set_points[:, :3, 0], place), set_points[:, :, 1]
         yaw = np.where(has_goal, set_points[:, 3, 0], heading)
-        near = self._way.near(batch.movers, view)
         is_stopped = np.zeros(count, bool)
-        for _ in range(self._substeps):
+        for _ in range(self.substeps):
             wanted = np.where(has_goal[:, None], self._wanted(goal - place, most), 0.0)
-            step = batch.acceleration * (EACH * dt)
+            step = self._acceleration * (EACH * dt)
             velocity[:, 0:2] = approached_together(velocity[:, 0:2], wanted[:, 0:2], step)
             velocity[:, 2] = approached(velocity[:, 2], wanted[:, 2], step)
             place, shares, stops = near.free_way(place, velocity * dt)
@@ -127,11 +109,11 @@ class RotorcraftMotion(Motion):
             turned = np.minimum(np.maximum(shorter(yaw - heading), -most[:, 3] * dt), most[:, 3] * dt)
             heading = wrapped(heading + turned)
         z, w = upright_turn(heading)
-        after = np.zeros((count, batch.state.width))
+        after = np.zeros((count, self.state.width))
         after[:, 0:3], after[:, 5], after[:, 6], after[:, 7:10] = place, z, w, velocity
         after[:, 12], after[:, 13], after[:, 15] = turned / dt, heading, is_stopped
         after[:, 14] = has_goal & (_length(goal - place) <= ARRIVED_M) & (np.abs(shorter(yaw - heading)) <= ARRIVED_M)
-        batch.state.write(view, after)
+        self.state.write(view, after)
 
     def _wanted(self, way: Floats, most: Floats) -> Floats:
         """Return the wanted velocities for the ways that are left (m)."""
@@ -146,7 +128,7 @@ class RotorcraftMotion(Motion):
 
     def _fastest(self, way: Floats, most: Floats) -> Floats:
         """Return the greatest speed that still allows a stop at the end of this way."""
-        dt, brake = self._dt, self._batch.acceleration * EACH
+        dt, brake = self.dt, self._acceleration * EACH
         steps = np.maximum(np.ceil((np.sqrt(1.0 + 8.0 * way / (brake * dt * dt)) - 1.0) / 2.0), 1.0)
         found: Floats = np.minimum(way / (steps * dt) + brake * dt * (steps - 1.0) / 2.0, most)
         return found

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated, Final
 
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
-from foosim.library.mobile.differential_drive import WheeledMotion
+from foosim.library.mobile.differential_drive import WHEELS, WheeledMotion
 from foosim.library.mobile.hall_settings import Place, hall_of
-from foosim.library.mobile.vehicles import DARK, mast, standing
+from foosim.library.mobile.vehicles import body_of
 from foosim.library.mobile.wheels import Wheels, slips_of
+from foosim.world.component_types.descriptions import BODY
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.matter.materials import METAL, PLASTIC
+from foosim.world.moving.free_way import ROUNDING
 from foosim.world.moving.upright import Upright
-from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Shape, turn
+from foosim.world.scene import Body, Colour, turn
 
 ORANGE: Final[Colour] = (0.95, 0.50, 0.10, 1.0)
-ROUNDING: Final = 1.000001
-"""A way is no longer than its speed allows, but for rounding."""
-
 Heading = Annotated[float, Quantity(units.ANGLE, "-360 deg", "360 deg")]
 CHARGE: Final = Quantity(units.PROBABILITY, "0 %", "100 %")
 Charge = Annotated[float, CHARGE]
@@ -43,13 +40,8 @@ class RoverRobot(RobotSettings):
     "rover",
     RoverRobot,
     slots={
-        "position": 3,
-        "orientation": 4,
-        "linear_velocity": 3,
-        "angular_velocity": 3,
-        "heading": 1,
-        "wheel_speeds": 2,
-        "wheel_travel": 2,
+        **BODY,
+        **WHEELS,
         "blocked": 1,
         "quarantined": 1,
         "down": 1,
@@ -80,14 +72,7 @@ class Rover(Model):
 
     def body(self) -> Body:
         """Return a round hull, a mark ahead, and the antenna's mast where it is higher than the hull."""
-        rover = self._rover
-        middle = (0.0, 0.0, rover.height / 2)
-        hull = Shape(Cylinder(rover.radius, rover.height), "rover", ORANGE, middle, radio=METAL)
-        mark = Box((rover.radius / 4, rover.radius / 8, rover.height / 16))
-        ahead = Shape(mark, "rover", DARK, (rover.radius / 2, 0.0, rover.height + rover.height / 16), radio=PLASTIC)
-        shapes = (hull, ahead, *mast(rover.height, rover.antenna_height, "rover"))
-        body = standing(self._at.robot.name, "rover", ORIGIN, "free", shapes, rover.antenna_height)
-        return replace(body, speed_limit=rover.drive.speed)
+        return body_of(self._rover, self._at.robot.name, "rover", ORANGE, self._rover.drive.speed, "rover")
 
     def upright(self) -> Upright:
         """Return its cylinder for obstacles: its hull, up to the top of its antenna."""

@@ -15,8 +15,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from foosim.common.exact_math import cos, sin
-from foosim.world.components.beams import body_of, hull_middle, mounted_at
-from foosim.world.components.mounted import Mounted
+from foosim.world.components.beams import hull_middle, mounted_at
+from foosim.world.components.mounted import Mounted, body_at
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting, View
 from foosim.world.scene import shape_box
@@ -82,7 +82,7 @@ class Feelers:
 
     def __init__(self, at: Mounting, length: float) -> None:
         """`length` is in m. Raises BadValue for a robot without a hull."""
-        hull = body_of(at).links[0]
+        hull = body_at(at).links[0]
         self._mount = Mounted(at, mounted_at(hull_middle(hull)))
         self._around, self._robot = Surroundings(at.spec, at.layout), at.robot
         (lx, ly, _), (hx, hy, _) = shape_box(hull.shapes[0])

@@ -16,7 +16,7 @@ from foosim.library.mobile.wheels import wheels_of
 from foosim.world.component_types.quantities import MetresPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator, slot
+from foosim.world.components.base import SetPointActuator, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 
@@ -36,7 +36,7 @@ class Motion(Struct, frozen=True):
 
 
 @actuator("v_w", VWSettings, Motion, needs=("wheel_speeds",))
-class MotionActuator(Actuator):
+class MotionActuator(SetPointActuator):
     """The two wheels of a robot, as one motion."""
 
     _set_point = slot(2)
@@ -50,15 +50,6 @@ class MotionActuator(Actuator):
         """Return the least and greatest speed (m/s) and turn rate (rad/s)."""
         speed, rate = self._wheels.speed, self._wheels.turn_rate
         return {"linear": (-speed, speed), "angular": (-rate, rate)}
-
-    def accept(self, command: Motion, view: WritableView) -> bool:
-        """Take a motion."""
-        view.write(self._set_point, command.linear, command.angular)
-        return True
-
-    def hold(self, view: WritableView) -> None:
-        """Stop the wheels."""
-        view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
         """Drive in a curve, for the run that compares engines."""

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
 
 from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity, custom_error
+from foosim.library.mobile.hall_settings import Rover
 from foosim.world.component_types.settings import RobotSettings
-from foosim.world.components.base import Model
+from foosim.world.components.base import Model, Motion
+from foosim.world.components.entities import MotionMounting
 from foosim.world.components.view import Mounting, WritableView
+from foosim.world.layout import Entity
 from foosim.world.matter.materials import METAL, PLASTIC
 from foosim.world.matter.physics import DEFAULT
+from foosim.world.moving.columns import EntityColumns
+from foosim.world.moving.free_way import ROUNDING, FreeWay, Near
+from foosim.world.moving.solids import Floats
 from foosim.world.moving.upright import Upright
 from foosim.world.placing import ORIGIN_OF_WORLD, At, leaning
 from foosim.world.scene import ORIGIN, Body, Box, Colour, Cylinder, Link, Shape, Vector, turn
@@ -27,8 +33,6 @@ Acceleration = Annotated[float, Quantity(units.ACCELERATION, "1 mm/s2", "100 m/s
 TurnRate = Annotated[float, Quantity(units.SPIN, "1 deg/s", "1000 deg/s")]
 Slip = Annotated[float, Quantity(units.PROBABILITY, "0 %", "50 %")]
 
-ROUNDING: Final = 1.000001
-"""A way is no longer than its speed allows, but for rounding."""
 DARK: Final[Colour] = (0.15, 0.15, 0.18, 1.0)
 MAST_RADIUS_M: Final = 0.01
 HULL: Final = DEFAULT
@@ -56,28 +60,22 @@ class Vehicle(RobotSettings):
     antenna_height: Antenna = default("35 cm")
 
 
-def body_of(vehicle: Vehicle, name: str, model: str, colour: Colour, speed_limit: float) -> Body:
+def body_of(
+    vehicle: Vehicle | Rover, name: str, model: str, colour: Colour, speed_limit: float, surface: str = HULL
+) -> Body:
     """Return a round hull, a mark ahead on it, and the antenna's mast; it has no mass, since no engine moves it."""
     radius, height = vehicle.radius, vehicle.height
-    hull = Shape(Cylinder(radius, height), HULL, colour, (0.0, 0.0, height / 2), radio=METAL)
-    shapes = (hull, mark_of(vehicle, HULL), *mast(height, vehicle.antenna_height, HULL))
+    hull = Shape(Cylinder(radius, height), surface, colour, (0.0, 0.0, height / 2), radio=METAL)
+    shapes = (hull, mark_of(vehicle, surface), *mast(height, vehicle.antenna_height, surface))
     link = Link(name, "free", shapes, 0.0, ORIGIN)
     return Body(name, model, ORIGIN, (link,), (0.0, 0.0, vehicle.antenna_height), speed_limit)
 
 
-def mark_of(vehicle: Vehicle, surface: str) -> Shape:
+def mark_of(vehicle: Vehicle | Rover, surface: str) -> Shape:
     """Return the mark on a hull that is ahead of its middle."""
     radius, height = vehicle.radius, vehicle.height
     mark = Box((radius / 4, radius / 8, height / 16))
     return Shape(mark, surface, DARK, (radius / 2, 0.0, height + height / 16), radio=PLASTIC)
-
-
-def standing(
-    name: str, model: str, at: Vector, joint: Literal["free", "fixed"], shapes: tuple[Shape, ...], antenna_m: float
-) -> Body:
-    """Return a body of one link. It has no mass: no engine moves it."""
-    link = Link(name, joint, shapes, 0.0, ORIGIN)
-    return Body(name, model, at, (link,), (0.0, 0.0, antenna_m))
 
 
 def mast(bottom: float, top: float, surface: str) -> tuple[Shape, ...]:
@@ -117,6 +115,31 @@ class KinematicModel(Model):
         at, reach_m = self._position, self._reach_m
         dx, dy, dz = numbers[at] - before[at], numbers[at + 1] - before[at + 1], numbers[at + 2] - before[at + 2]
         return dx * dx + dy * dy + dz * dz <= reach_m * reach_m
+
+
+class FreeMotion(Motion):
+    """A motion as far as nothing is in the way (`moving.free_way`)."""
+
+    fields: ClassVar[tuple[str, ...]]
+    """The fields that it writes, those of its state."""
+    is_level: ClassVar[bool] = False
+    """Whether what it moves keeps its height."""
+
+    def __init__(self, at: MotionMounting) -> None:
+        self.at, self._way, self._columns = at, FreeWay(at), EntityColumns(at, self.fields)
+        self.substeps, self.dt = at.spec.substeps, at.spec.tick_ns / 1e9 / at.spec.substeps
+        self.take(at.entities)
+
+    def take(self, entities: Sequence[Entity]) -> None:
+        """Keep what holds of these entities, which one node moves in a tick."""
+        self._entities = list(entities)
+        self.state, self._movers = self._columns.of(entities), self._way.movers(entities, is_level=self.is_level)
+
+    def start(self, entities: Sequence[Entity], view: WritableView) -> tuple[Floats, Near]:
+        """Return the state of these entities at the start of a tick, and what they may meet within it."""
+        if self._entities != entities:
+            self.take(entities)
+        return self.state.read_at_start(view), self._way.near(self._movers, view)
 
 
 class VehicleModel(KinematicModel):

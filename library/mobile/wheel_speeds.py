@@ -11,7 +11,7 @@ from foosim.library.mobile.wheels import wheels_of
 from foosim.world.component_types.quantities import MetresPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator, slot
+from foosim.world.components.base import SetPointActuator, slot
 from foosim.world.components.entities import Motors
 from foosim.world.components.view import Mounting, View, WritableView
 
@@ -31,7 +31,7 @@ class Drive(Struct, frozen=True):
 
 
 @actuator("wheel_speeds", WheelSpeedsSettings, Drive, needs=("wheel_speeds",))
-class DriveActuator(Actuator):
+class DriveActuator(SetPointActuator):
     """The two wheels of a robot."""
 
     _set_point = slot(2)
@@ -44,15 +44,6 @@ class DriveActuator(Actuator):
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest speed of each wheel (m/s)."""
         return {"left": (-self._speed, self._speed), "right": (-self._speed, self._speed)}
-
-    def accept(self, command: Drive, view: WritableView) -> bool:
-        """Take the wheels' speeds."""
-        view.write(self._set_point, command.left, command.right)
-        return True
-
-    def hold(self, view: WritableView) -> None:
-        """Stop the wheels."""
-        view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
         """Drive in a curve, for the run that compares engines."""

@@ -7,10 +7,9 @@ from typing import Any
 
 from foosim.common.errors import BadValue
 from foosim.common.keyed_random import draw_key, draw_words, unit_interval
-from foosim.world.components.entities import Motors
+from foosim.world.components.entities import Motors, made_model
 from foosim.world.components.view import View
 from foosim.world.layout import Entity, Layout
-from foosim.world.moving.upright import made_model
 from foosim.world.spec import WorldSpec
 
 

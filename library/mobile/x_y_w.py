@@ -11,7 +11,7 @@ from foosim.library.mobile.holonomic import HolonomicRobot
 from foosim.world.component_types.quantities import MetresPerSecond
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator, slot
+from foosim.world.components.base import SetPointActuator, slot
 from foosim.world.components.view import Mounting, View, WritableView
 
 
@@ -28,7 +28,7 @@ class Velocity(Struct, frozen=True):
 
 
 @actuator("x_y_w", XYWSettings, Velocity, needs=("base_velocity",))
-class VelocityActuator(Actuator):
+class VelocityActuator(SetPointActuator):
     """The drive of a base, which keeps the velocity of the last command."""
 
     _set_point = slot(3)
@@ -51,15 +51,6 @@ class VelocityActuator(Actuator):
             return command
         share = most / hypot(x, y)
         return Velocity(x * share, y * share, command.angular)
-
-    def accept(self, command: Velocity, view: WritableView) -> bool:
-        """Take a velocity."""
-        view.write(self._set_point, command.x, command.y, command.angular)
-        return True
-
-    def hold(self, view: WritableView) -> None:
-        """Stop it."""
-        view.write(self._set_point, 0.0, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
         """Go askew in a curve, for the run that compares engines."""

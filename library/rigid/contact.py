@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import ClassVar
 
 from msgspec import Struct
 
 from foosim.world.component_types.quantities import Count, NewtonSeconds
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor, need
-from foosim.world.components.view import SlotReadings, View
+from foosim.world.components.base import need
+from foosim.world.components.rows import SlotSensor
 
 
 class ContactSettings(SensorSettings):
@@ -27,15 +27,8 @@ class Touches(Struct, frozen=True):
 
 
 @sensor("contact", ContactSettings, Touches, trigger="contacts")
-class ContactSensor(Sensor):
+class ContactSensor(SlotSensor):
     """Touches of a robot in the last tick: how many began, their impulse, the last substep with one."""
 
     contacts = need()
-
-    def sample(self, view: View) -> Touches:
-        return Touches(*view.read(self.contacts))
-
-    @staticmethod
-    def together(sensors: Sequence[ContactSensor]) -> SlotReadings:
-        """Return these as one."""
-        return SlotReadings([one.contacts.places for one in sensors])
+    reading: ClassVar = Touches

@@ -7,7 +7,7 @@ from msgspec import Struct
 from foosim.library.rigid.joints import JointActuator, JointLoopSettings, Positions
 from foosim.world.component_types.registry import actuator
 from foosim.world.components.entities import Motors
-from foosim.world.components.view import Mounting, View, WritableView
+from foosim.world.components.view import Mounting, View
 
 
 class JointPositionSettings(JointLoopSettings):
@@ -34,11 +34,6 @@ class JointPositionActuator(JointActuator):
     def bounds(self) -> tuple[tuple[float, float], ...]:
         """Return the least and the greatest position of each joint."""
         return tuple(zip(self.group.lows, self.group.highs, strict=True))
-
-    def accept(self, command: JointPositions, view: WritableView) -> bool:
-        """Take the set-points of all joints."""
-        view.write(self.set_point, *command.positions)
-        return True
 
     def command(self, view: View) -> Motors:
         """Return speed and greatest force of each motor."""

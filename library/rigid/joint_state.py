@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 from msgspec import Meta, Struct
@@ -11,10 +11,10 @@ from pydantic import Field
 from foosim.world.component_types.descriptions import JOINTS, JOINTS_READ_MAX
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor
 from foosim.world.components.joint_names import JointNames, joint_indices
 from foosim.world.components.mounted import body_at
-from foosim.world.components.view import Mounting, SlotReadings, View
+from foosim.world.components.rows import SlotSensor
+from foosim.world.components.view import Mounting
 
 Several = Annotated[tuple[float, ...], Meta(min_length=1, max_length=JOINTS_READ_MAX)]
 
@@ -45,19 +45,14 @@ def joints_of(settings: JointStateSettings, counts: Mapping[str, int]) -> int:
 
 
 @sensor("joint_state", JointStateSettings, JointState, needs=JOINTS, array_length=joints_of, joints="joints")
-class JointStates(Sensor):
+class JointStates(SlotSensor):
     """Positions, velocities and efforts of joints."""
+
+    @staticmethod
+    def reading(*numbers: float) -> JointState:
+        count = len(numbers) // 3
+        return JointState(numbers[:count], numbers[count : 2 * count], numbers[2 * count :])
 
     def __init__(self, settings: JointStateSettings, at: Mounting) -> None:
         joints = joint_indices(body_at(at), settings.joints, has_motors=False)
         self.places = [at.slot(field).at + joint for field in JOINTS for joint in joints]
-
-    def sample(self, view: View) -> JointState:
-        numbers = [view.numbers[place] for place in self.places]
-        count = len(numbers) // 3
-        return JointState(tuple(numbers[:count]), tuple(numbers[count : 2 * count]), tuple(numbers[2 * count :]))
-
-    @staticmethod
-    def together(sensors: Sequence[JointStates]) -> SlotReadings:
-        """Return these as one; all have as many joints."""
-        return SlotReadings([one.places for one in sensors])

@@ -28,11 +28,6 @@ class JointTorqueActuator(JointActuator):
         """Return the least and the greatest effort of each joint."""
         return tuple((-force, force) for force in self.group.forces)
 
-    def accept(self, command: JointEfforts, view: WritableView) -> bool:
-        """Take the efforts of all joints."""
-        view.write(self.set_point, *command.efforts)
-        return True
-
     def hold(self, view: WritableView) -> None:
         """Let the joints go."""
         view.write(self.set_point, *[0.0] * self.set_point.size)

@@ -28,11 +28,6 @@ class JointVelocityActuator(JointActuator):
         """Return the least and the greatest speed of each joint."""
         return tuple((-speed, speed) for speed in self.group.speeds)
 
-    def accept(self, command: JointVelocities, view: WritableView) -> bool:
-        """Take the speeds of all joints."""
-        view.write(self.set_point, *command.velocities)
-        return True
-
     def hold(self, view: WritableView) -> None:
         """Stop the joints."""
         view.write(self.set_point, *[0.0] * self.set_point.size)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from msgspec import Meta
+from msgspec.structs import astuple
 from pydantic import Field
 
 from foosim.common import units
@@ -106,6 +107,12 @@ class JointActuator(Actuator):
     def names(self) -> tuple[str, ...]:
         """Return the names of the numbers of a command: those of the joints."""
         return self.group.names
+
+    def accept(self, command: Any, view: WritableView) -> bool:
+        """Take the number of each joint."""
+        (numbers,) = astuple(command)
+        view.write(self.set_point, *numbers)
+        return True
 
     def hold(self, view: WritableView) -> None:
         """Make the present positions the set-points."""

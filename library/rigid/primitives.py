@@ -26,8 +26,6 @@ ObjectMass = Annotated[float, Quantity(units.MASS, "1 mg", "1000000 kg")]
 Extent = Annotated[float, Quantity(units.LENGTH, "0.1 mm", "1000 m")]
 SpeedLimit = Annotated[float, Quantity(units.SPEED, "1 mm/s", "10000 m/s")]
 
-ROUNDING: Final = 1.000001
-"""A way is no longer than its speed allows, but for rounding."""
 RIGID: Final = {**BODY, **CONTACTS, **PARTNERS, **RESTING, "quarantined": 1}
 """The fields of a free rigid body."""
 

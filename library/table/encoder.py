@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import ClassVar
 
 from msgspec import Struct
 
 from foosim.world.component_types.quantities import Metres, Radians
 from foosim.world.component_types.registry import sensor
 from foosim.world.component_types.settings import SensorSettings
-from foosim.world.components.base import Sensor, need
-from foosim.world.components.view import SlotReadings, View
+from foosim.world.components.base import need
+from foosim.world.components.rows import SlotSensor
 
 
 class EncoderSettings(SensorSettings):
@@ -25,15 +25,8 @@ class RodPosition(Struct, frozen=True):
 
 
 @sensor("encoder", EncoderSettings, RodPosition)
-class Encoder(Sensor):
+class Encoder(SlotSensor):
     """Slide and spin of a rod."""
 
     joint_positions = need()
-
-    def sample(self, view: View) -> RodPosition:
-        return RodPosition(*view.read(self.joint_positions))
-
-    @staticmethod
-    def together(sensors: Sequence[Encoder]) -> SlotReadings:
-        """Return these as one."""
-        return SlotReadings([one.joint_positions.places for one in sensors])
+    reading: ClassVar = RodPosition

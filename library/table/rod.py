@@ -89,7 +89,9 @@ class Rod(Model):
         tube = Shape(Cylinder(rod.radius, rod.length), "rods", STEEL, orientation=ALONG_Y, radio=METAL)
         thin = rod.carriage_mass * rod.length * rod.length / 12.0
         mass, centre, (across, about, upwards) = _spin_mass(table, line)
-        along, around = _rotors(self._settings)
+        actuators = [its for _, its in sorted(self._settings.actuators.items())]
+        motors = [its for its in actuators if isinstance(its, RodVoltageSettings)]
+        along, around = sum([its.slide.rotor for its in motors], 0.0), sum([its.spin.rotor for its in motors], 0.0)
         slide = Link(
             name=f"{name}/slide",
             joint="prismatic",
@@ -122,12 +124,6 @@ class Rod(Model):
             and -self._slide_speed_max <= numbers[speed] <= self._slide_speed_max
             and -self._spin_speed_max <= numbers[speed + 1] <= self._spin_speed_max
         )
-
-
-def _rotors(settings: RodRobot) -> tuple[float, float]:
-    """Return what the rotors of a rod's motors add: to what slides (kg), and to what turns (kg m2)."""
-    motors = [its for _, its in sorted(settings.actuators.items()) if isinstance(its, RodVoltageSettings)]
-    return sum([its.slide.rotor for its in motors], 0.0), sum([its.spin.rotor for its in motors], 0.0)
 
 
 def figure_ys(line: Line) -> list[float]:

@@ -9,16 +9,16 @@ the speed by b = k_t k_e / R, to 0 at u / k_e.
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, ClassVar, Protocol
+from typing import Annotated, ClassVar
 
 from foosim.common import units
 from foosim.common.spec_base import SpecBase, default
 from foosim.common.units import Quantity
 from foosim.library.table.settings import table_of
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator, need, slot
+from foosim.world.components.base import SetPointActuator, need, slot
+from foosim.world.components.entities import made_model
 from foosim.world.components.view import Mounting, WritableView
-from foosim.world.moving.upright import made_model
 from foosim.world.scene import load_of
 
 SLIDE, SPIN = 0, 1
@@ -95,18 +95,11 @@ class RodLimits:
         )
 
 
-class RodCommand(Protocol):
-    """A command of two numbers, one for each motor of a rod."""
+class RodSetPoint(SetPointActuator):
+    """The last command to a rod's motors, in the slot `set_point`: two numbers, each within its bounds.
 
-    @property
-    def slide(self) -> float: ...
-
-    @property
-    def spin(self) -> float: ...
-
-
-class RodSetPoint(Actuator):
-    """The last command to a rod's motors, in the slot `set_point`: two numbers, each within its bounds."""
+    All are 0 when it holds: a speed of 0, no force, or shorted motors, which brake.
+    """
 
     steady: ClassVar = True
     """Its set-points follow from the state of its rod alone."""
@@ -120,15 +113,6 @@ class RodSetPoint(Actuator):
         """Return the least and the greatest numbers."""
         slide, spin = self._bounds
         return {"slide": (-slide, slide), "spin": (-spin, spin)}
-
-    def accept(self, command: RodCommand, view: WritableView) -> bool:
-        """Take both numbers."""
-        view.write(self._set_point, command.slide, command.spin)
-        return True
-
-    def hold(self, view: WritableView) -> None:
-        """Set all to 0: a speed of 0, no force, or shorted motors, which brake."""
-        view.write(self._set_point, 0.0, 0.0)
 
     def excite(self, view: WritableView) -> None:
         """Slide and turn, for the run that compares engines."""

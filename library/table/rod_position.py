@@ -15,7 +15,7 @@ from foosim.library.table.settings import table_of
 from foosim.world.component_types.quantities import Metres, Radians
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator, need, slot
+from foosim.world.components.base import SetPointActuator, need, slot
 from foosim.world.components.view import Mounting, View, WritableView
 
 ANGLE_RAD_MAX: Final = 1000.0
@@ -34,7 +34,7 @@ class Command(Struct, frozen=True):
 
 
 @actuator("rod_position", RodPositionSettings, Command, kit="table")
-class PositionActuator(Actuator):
+class PositionActuator(SetPointActuator):
     """A proportional loop from a rod's set-point to the speeds of its motors."""
 
     steady: ClassVar = True
@@ -52,11 +52,6 @@ class PositionActuator(Actuator):
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and greatest slide (m) and spin (rad)."""
         return {"slide": (-self._slide_m_max, self._slide_m_max), "spin": (-ANGLE_RAD_MAX, ANGLE_RAD_MAX)}
-
-    def accept(self, command: Command, view: WritableView) -> bool:
-        """Take a set-point."""
-        view.write(self._set_point, command.slide, command.spin)
-        return True
 
     def hold(self, view: WritableView) -> None:
         """Make the present position the set-point."""

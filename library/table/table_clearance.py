@@ -42,7 +42,7 @@ def clearance_findings(spec: WorldSpec) -> Iterator[Finding]:
         shape = scenery_shape(name, thing, mesh)
         low, high = shape_box(shape)
         for body in swept:
-            if not _boxes_meet(low, high, body.low, body.high):
+            if not all(low[axis] < body.high[axis] and body.low[axis] < high[axis] for axis in range(3)):
                 continue
             parts = convex_parts(shape, shape.position, shape.orientation, body.low, body.high)
             if any(overlap_of(part, body.solid, TOUCH_M) > 0.0 for part in parts):
@@ -85,7 +85,3 @@ def _turned(what: str, x: float, z: float, radius: float, sides: tuple[float, fl
     middle, length = (x, (sides[0] + sides[1]) / 2, z), sides[1] - sides[0]
     low, high = (x - radius, sides[0], z - radius), (x + radius, sides[1], z + radius)
     return _Swept(what, low, high, Solid(Cylinder(radius, length), middle, ALONG_Y))
-
-
-def _boxes_meet(low: Vector, high: Vector, other_low: Vector, other_high: Vector) -> bool:
-    return all(low[n] < other_high[n] and other_low[n] < high[n] for n in range(3))

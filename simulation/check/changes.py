@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from foosim.deployment.loader import expanded_text, load_deployment
@@ -10,7 +10,6 @@ from foosim.deployment.text.yaml import locate_in, plain, read_tree, write_yaml
 from foosim.world.component_types.registry import model
 from foosim.world.component_types.settings import RobotSettings
 from foosim.world.components.base import Model
-from foosim.world.components.view import Mounting, WritableView
 from foosim.world.layout import build_layout
 
 COMING_MAX: Final = 64
@@ -24,19 +23,6 @@ class BystanderRobot(RobotSettings):
 @model("bystander", BystanderRobot, slots={"down": 1, "refused": 1}, has_body=False)
 class Bystander(Model):
     """A robot without a body, for the check of components."""
-
-    def __init__(self, settings: BystanderRobot, at: Mounting) -> None:
-        pass
-
-    def body(self) -> None:
-        """Nothing that radio waves or viewers would meet."""
-
-    def place(self, view: WritableView) -> None:
-        """It has no state of its own."""
-
-    def is_plausible(self, numbers: Sequence[float], before: Sequence[float]) -> bool:
-        """Nothing moves it."""
-        return True
 
 
 def changed(text: str, name: str) -> Iterator[tuple[str, str]]:

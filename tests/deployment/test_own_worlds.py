@@ -308,9 +308,7 @@ def test_rays_start_on_robots_that_are_no_rovers(site: Path, fleet_text: Callabl
     text = fleet_text(1, robot, "players={}", "nodes={one: {robots: ['*']}}", "network={}")
     done = rehearse(text, "x.yaml", 20, 1)
     assert not done.json["failed"], done.json["reason"]
-    with pytest.raises(
-        DeploymentError, match=r"robots.mast.sensors: .*it sends rays from a robot without a body, 'mast'"
-    ):
+    with pytest.raises(DeploymentError, match=r"robots.mast.sensors: .*mast has no body to carry it, 'ghost'"):
         load_deployment(text.replace("own_form:Mast", "own_form:Ghost"), "x.yaml")
 
 

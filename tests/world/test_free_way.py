@@ -11,8 +11,9 @@ import yaml
 from foosim.common.errors import DeploymentError
 from foosim.deployment.loader import load_deployment
 from foosim.node.tick import Stepper
+from foosim.world.components.entities import made_model
 from foosim.world.moving.solids import scenery_of
-from foosim.world.moving.upright import made_model, upright_of
+from foosim.world.moving.upright import upright_of
 from foosim.world.rays.outlines import Outline, outline
 from foosim.world.scene import shape_box
 from tests.components.worlds import TABLE

@@ -136,9 +136,14 @@ class Assignment:
         self._divided: tuple[list[BodyIsland], dict[str, Share]] = [], {}
         """The islands of any bodies that were divided last, and their shares."""
 
-    def solver_of(self, island: Island) -> str:
-        """Return the node that solves an island: its nearest robot's owner, else the first node of the roster."""
-        return self.owners[island.nearest] if island.nearest else self.roster[0]
+    def solver_of(self, island: Island | BodyIsland) -> str:
+        """Return the node that solves an island: its nearest robot's owner, else the first node of the roster, or of
+        any bodies the one that follows from the name of the first."""
+        if island.nearest:
+            return self.owners[island.nearest]
+        if isinstance(island, BodyIsland):
+            return solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
+        return self.roster[0]
 
     def shares(self, numbers: Sequence[float], values: NDArray[np.float64] | None = None) -> dict[str, Share]:
         """Return every node's share of the tick that starts from these edited numbers; `values` are the same as an
@@ -150,7 +155,7 @@ class Assignment:
         if isinstance(self.reach, Volumes):
             islands = self.reach.islands(numbers)
             if not self._divided[1] or islands is not self._divided[0]:
-                self._divided = islands, self._divide_any(islands)
+                self._divided = islands, self._divide(islands)
             return self._divided[1]
         touching = touching_of(numbers, self.reach)
         if len(self.reach.balls) > 1:
@@ -160,39 +165,21 @@ class Assignment:
             shares = self._shares[touching] = self._divide(islands_of(numbers, self.reach, touching))
         return shares
 
-    def _solver_of_any(self, island: BodyIsland) -> str:
-        if island.nearest:
-            return self.owners[island.nearest]
-        return solver_by_name(self.layout.entities[island.entities[0]].name, self.roster)
-
-    def _divide(self, islands: tuple[Island, ...]) -> dict[str, Share]:
-        mine: dict[str, list[tuple[int, ...]]] = {node: [] for node in self.roster}
+    def _divide(self, islands: Sequence[Island | BodyIsland]) -> dict[str, Share]:
+        mine: dict[str, list[Island | BodyIsland]] = {node: [] for node in self.roster}
         solved: dict[str, list[int]] = {node: [] for node in self.roster}
         for island in islands:
             solver = self.solver_of(island)
-            mine[solver].append(island.entities)
-            solved[solver].extend(island.entities)
-        self._add_unsolved(solved)
-        return {node: Share(tuple(mine[node]), tuple(sorted(solved[node]))) for node in self.roster}
-
-    def _divide_any(self, islands: Sequence[BodyIsland]) -> dict[str, Share]:
-        mine: dict[str, list[BodyIsland]] = {node: [] for node in self.roster}
-        solved: dict[str, list[int]] = {node: [] for node in self.roster}
-        for island in islands:
-            solver = self._solver_of_any(island)
             mine[solver].append(island)
             solved[solver].extend(island.entities)
-        self._add_unsolved(solved)
-        return {
-            node: Share(
-                tuple([island.entities for island in mine[node]]),
-                tuple(sorted(solved[node])),
-                tuple([island.movers for island in mine[node]]),
-            )
-            for node in self.roster
-        }
-
-    def _add_unsolved(self, solved: dict[str, list[int]]) -> None:
-        """Add unsolved and absent entities: each is copied by its owner, by the first node without one."""
+        # Unsolved and absent entities are copied by their owners, by the first node without one.
         for index in sorted({*self._unsolved, *self._absent}):
             solved[self.owners.get(self.layout.entities[index].name, self.roster[0])].append(index)
+        return {
+            node: Share(
+                tuple([island.entities for island in its]),
+                tuple(sorted(solved[node])),
+                tuple([island.movers for island in its if isinstance(island, BodyIsland)]),
+            )
+            for node, its in mine.items()
+        }

@@ -9,13 +9,13 @@ follows from the frame; only + - x / sqrt and comparisons, element by element, s
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 from math import sqrt
 from operator import itemgetter
-from typing import Final, NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,12 +149,12 @@ class Volumes:
         self._is_mover = [not entity.is_rigid for entity in self._entities]
         free = [one for one in felt if one.body.is_free]
         self._free = np.array([row for row, one in enumerate(felt) if one.body.is_free], np.intp)
-        self._poses = itemgetter(*[at for one in free for at in _pose_places(one.entity)]) if free else None
+        self._poses = _getter(free, "position", "orientation")
         """Returns the position and the quaternion's parts of each free body, from a frame's numbers."""
         self._position_of = {one.entity.index: one.entity.offsets["position"] for one in free}
         self._middles = np.array([one.middle for one in free]).reshape(-1, 1, 3)
         self._halves = np.array([one.half for one in free]).reshape(-1, 1, 3)
-        self._moves = itemgetter(*[at for one in free for at in _move_places(one.entity)]) if free else None
+        self._moves = _getter(free, "linear_velocity", "angular_velocity")
         """Returns the velocity and the spin of each free body."""
         self._radii = np.array([one.radius for one in free])
         self._limits = np.array([one.body.speed_limit for one in free])
@@ -302,16 +302,10 @@ def overlapping(boxes: Numbers) -> list[tuple[int, int]]:
     return sorted(map(tuple, pairs.tolist()))
 
 
-def _pose_places(entity: Entity) -> list[int]:
-    """Return the places of a free body's position and of its quaternion's parts."""
-    at, turned = entity.offsets["position"], entity.offsets["orientation"]
-    return [*range(at, at + 3), *range(turned, turned + 4)]
-
-
-def _move_places(entity: Entity) -> list[int]:
-    """Return the places of a free body's velocity and spin."""
-    at, spin = entity.offsets["linear_velocity"], entity.offsets["angular_velocity"]
-    return [*range(at, at + 3), *range(spin, spin + 3)]
+def _getter(felt: Sequence[_Felt], *fields: str) -> Callable[[Sequence[float]], Any] | None:
+    """Return what gets the numbers of fields of entities from a frame's, of at least one entity."""
+    slots = [(one.entity.offsets[field], one.entity.counts[field]) for one in felt for field in fields]
+    return itemgetter(*[at + step for at, count in slots for step in range(count)]) if felt else None
 
 
 def reach_speed(speed_limit: float, present: float) -> float:

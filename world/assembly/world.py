@@ -319,7 +319,8 @@ class World:
         `start` are the numbers at the tick's start, `values` the same as an array where there is one already.
         """
         if self._moving.entities != entities:
-            self._moving = self._moving_of(entities)
+            groups = [(kind, moved, self._together(kind, moved)) for kind, moved in _by_motion(entities).items()]
+            self._moving = _Moving(list(entities), groups)
         if not self._moving.groups:
             return
         view, driving = WritableView(tick, start, None, numbers, values), View(tick, numbers, start=start)
@@ -335,10 +336,6 @@ class World:
                 if not isinstance(error, KeyboardInterrupt) and together is None:
                     self.check_motors(moved, commands, tick)
                 raise component_error(f"motion {kind.__name__}", "", tick, error) from error
-
-    def _moving_of(self, entities: Sequence[Entity]) -> _Moving:
-        groups = _by_motion(entities)
-        return _Moving(list(entities), [(kind, moved, self._together(kind, moved)) for kind, moved in groups.items()])
 
     def _together(self, motion: type[Motion], entities: Sequence[Entity]) -> Any:
         """Return the `together` object of these entities' actuators; None where each is called by itself."""

@@ -36,7 +36,7 @@ def convex_hull(points: Floats, corners_max: int = CORNERS_MAX) -> Mesh:
 
     Raises BadValue for points that lie in a plane.
     """
-    points = _different(np.ascontiguousarray(points, dtype=np.float64) + 0.0)
+    points = np.unique(np.asarray(points, dtype=np.float64) + 0.0, axis=0)
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max())
     if len(points) < 4 or not extent > 0.0:
@@ -50,14 +50,6 @@ def convex_hull(points: Floats, corners_max: int = CORNERS_MAX) -> Mesh:
     found = np.ascontiguousarray(numbers.reshape(-1, 3), dtype=np.int32)
     vertices = _around(points, points[used], building)
     return Mesh(vertices, found, blake2b(vertices.tobytes() + found.tobytes(), digest_size=32).digest())
-
-
-def _different(points: Floats) -> Floats:
-    """Return points sorted by x, y and z, each once."""
-    points = points[np.lexsort((points[:, 2], points[:, 1], points[:, 0]))]
-    first = np.ones(len(points), dtype=bool)
-    (points[1:] != points[:-1]).any(axis=1, out=first[1:])
-    return points[first]
 
 
 class _Face:

@@ -266,16 +266,11 @@ def _volume(geometry: Geometry) -> float:
         x, y, z = geometry.half
         return 8.0 * x * y * z
     if isinstance(geometry, Hull):
-        return _mesh_volume(geometry.mesh)
+        vertices, triangles = geometry.mesh.vertices.tolist(), geometry.mesh.triangles.tolist()
+        return fsum([_six_volumes(vertices[a], vertices[b], vertices[c]) for a, b, c in triangles]) / 6.0
     assert not isinstance(geometry, Mesh), "a mesh need not have an inside"
     r2, ball = geometry.radius * geometry.radius, 0.0 if isinstance(geometry, Cylinder) else 4.0 / 3.0 * geometry.radius
     return pi * r2 * (ball if isinstance(geometry, Sphere) else ball + geometry.length)
-
-
-def _mesh_volume(mesh: Mesh) -> float:
-    vertices = mesh.vertices.tolist()
-    corners = [[vertices[corner] for corner in triangle] for triangle in mesh.triangles.tolist()]
-    return fsum([_six_volumes(a, b, c) for a, b, c in corners]) / 6.0
 
 
 def _six_volumes(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 from foosim.common.names import is_robot_name
 from foosim.world.bodies.urdf import MJCF, Robot, free_base_problem
 from foosim.world.bodies.urdf_base import base_of, height_of, wheels_of
-from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Mimic, Shape, Sphere
+from foosim.world.scene import MOVING, Box, Capsule, Cylinder, Hull, Link, Shape, Sphere
 
 MOST_DIGITS = 6
 ROUNDING_M = 1e-6
@@ -42,7 +42,7 @@ def as_json(robot: Robot) -> dict[str, Any]:
 
 def _link_json(robot: Robot, number: int) -> dict[str, Any]:
     link = robot.links[number]
-    joint = None
+    joint: dict[str, Any] | None = None
     if link.parent >= 0:
         moves, limited = link.joint in MOVING, link.joint in ("revolute", "prismatic")
         joint = {
@@ -56,8 +56,11 @@ def _link_json(robot: Robot, number: int) -> dict[str, Any]:
             "effort": _finite(link.effort) if moves else None,
             "speed": _finite(link.speed) if moves else None,
             "damping": link.damping if moves else None,
-            "follows": None if link.mimic is None else _mimic_json(robot, link.mimic),
+            "follows": None,
         }
+        if link.mimic is not None:
+            leader, ratio, offset = link.mimic.leader, link.mimic.ratio, link.mimic.offset
+            joint["follows"] = {"joint": robot.joints[leader], "ratio": ratio, "offset": offset}
     return {
         "name": link.name,
         "mass": link.mass,
@@ -71,10 +74,6 @@ def _link_json(robot: Robot, number: int) -> dict[str, Any]:
         "visuals": len(link.visuals),
         "joint": joint,
     }
-
-
-def _mimic_json(robot: Robot, mimic: Mimic) -> dict[str, Any]:
-    return {"joint": robot.joints[mimic.leader], "ratio": mimic.ratio, "offset": mimic.offset}
 
 
 def _finite(value: float) -> float | None:

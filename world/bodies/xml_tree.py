@@ -90,8 +90,8 @@ def read_xml(name: str, content: bytes) -> Element:
     if not content.strip():
         raise AssetError(f"{name}:1: an empty file")
     reading = _Reading(name)
-    if _LATE_DECLARATION.match(content):
-        content = _LATE_DECLARATION.sub(_blank, content, count=1)
+    if late := _LATE_DECLARATION.match(content):  # files have blank lines above it, which XML does not
+        content = b"\n" * late[0].count(b"\n") + content[late.end() :]
     try:
         reading.parser.Parse(content, True)
     except expat.ExpatError as error:
@@ -101,11 +101,6 @@ def read_xml(name: str, content: bytes) -> Element:
         raise AssetError(f"{name}:1: no XML, {describe('an unsupported encoding', str(error))}") from None
     assert reading.root is not None, "expat refuses a document without an element"
     return reading.root
-
-
-def _blank(declaration: re.Match[bytes]) -> bytes:
-    """Return the lines of a declaration without their text: files have blank lines above it, which XML does not."""
-    return b"\n" * declaration[0].count(b"\n")
 
 
 class _Reading:

@@ -10,10 +10,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from foosim.common.finding import Finding
+from foosim.world.components.entities import made_model
 from foosim.world.components.view import WritableView
 from foosim.world.layout import Entity, Layout, build_layout
 from foosim.world.moving.solids import Standing, distance, pairs_near, scenery_of, solid
-from foosim.world.moving.upright import Upright, made_model, stands_upright, upright_of
+from foosim.world.moving.upright import Upright, stands_upright, upright_of
 from foosim.world.spec import WorldSpec
 
 PLACED_BY = ("at", "path")

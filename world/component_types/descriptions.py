@@ -40,7 +40,6 @@ SLOTS_MAX: Final = 65_536
 WORDS: Final[Mapping[str, str]] = MappingProxyType({"entity_rule": "rule of entities", "rule": "rule of worlds"})
 """The nouns of component types, where these differ from their names."""
 NO_SLOTS: Final[Mapping[str, int]] = MappingProxyType({})
-
 BODY: Final[Mapping[str, int]] = MappingProxyType(
     {"position": 3, "orientation": 4, "linear_velocity": 3, "angular_velocity": 3}
 )

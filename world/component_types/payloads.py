@@ -85,7 +85,7 @@ class PayloadCodec:
 
     def named(self, value: Any, joints: Sequence[str]) -> dict[str, Any]:
         """Return a value's fields by name; in fields with a number for each joint, the numbers by the joints' names."""
-        found = as_mapping(value)
+        found = {} if isinstance(value, bytes) else msgspec.structs.asdict(value)
         for field in self.fields if joints else ():
             numbers = found[field.name]
             if self.is_of_joints(field):
@@ -272,11 +272,6 @@ def _is_finite(value: Any) -> bool:
     if isinstance(value, dict):
         return all(map(_is_finite, value.values()))
     return not isinstance(value, list | tuple) or all(map(_is_finite, value))
-
-
-def as_mapping(value: Value) -> dict[str, Any]:
-    """Return a value's fields by name; none of bytes."""
-    return {} if isinstance(value, bytes) else msgspec.structs.asdict(value)
 
 
 def _info(kind: type[Struct]) -> inspect.StructType:

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
+from msgspec.structs import astuple
+
 from foosim.world.component_types.jobs import JobState
 
 if TYPE_CHECKING:
@@ -163,6 +165,22 @@ class Actuator(Component):
     def progress(self, view: WritableView) -> JobState:
         """Return, after the robot was solved and while a job runs, whether it runs on, is done or has failed."""
         return JobState.FAILED
+
+
+class SetPointActuator(Actuator):
+    """An actuator that keeps all fields of the last command, each a number, in a slot."""
+
+    _set_point: Slot
+    """Declared by its class."""
+
+    def accept(self, command: Any, view: WritableView) -> bool:
+        """Take all numbers."""
+        view.write(self._set_point, *astuple(command))
+        return True
+
+    def hold(self, view: WritableView) -> None:
+        """Set all numbers to 0."""
+        view.write(self._set_point, *[0.0] * self._set_point.size)
 
 
 class Modifier(Component):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from typing import TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from foosim.common.errors import BadValue
-from foosim.world.components.entities import mounting_of
+from foosim.world.components.base import Sensor
 from foosim.world.components.mounted import Mounted, MountedTogether
 from foosim.world.components.rows import Rows
 from foosim.world.components.surroundings import Surroundings
@@ -18,7 +18,7 @@ from foosim.world.placing import FIRST_LINK, MountedAt
 from foosim.world.rays.boxes import Floats
 from foosim.world.rays.shapes import rotated_each
 from foosim.world.rays.solids import Meshes, solid_of
-from foosim.world.scene import Body, Link, Vector, shape_box
+from foosim.world.scene import Link, Vector, shape_box
 
 Directions: TypeAlias = Sequence[Vector]
 
@@ -28,7 +28,6 @@ class Beams:
 
     def __init__(self, at: Mounting, where: MountedAt, directions: Directions, range_m: float) -> None:
         """`directions` are unit vectors in the mount's frame. Raises BadValue without a body, or without the link."""
-        body_of(at)
         self.around, self.entity, self.mount = Surroundings(at.spec, at.layout), at.robot, Mounted(at, where)
         self.directions, self.range_m = np.array(directions).reshape(-1, 3), range_m
 
@@ -55,7 +54,7 @@ class BeamsTogether(Rows):
     def ends(self, numbers: Sequence[float], nearest: Floats, farthest: Floats) -> Floats:
         """Return both ends (m) of each beam in a frame, to be drawn, of shape (beams of all, 6).
 
-        They are where it is `nearest` from the mount, and where it meets something or is `farthest`: (sensors, beams).
+        They are where it is `nearest` from the mount, and where it meets something or is `farthest`: (beams,).
         """
         origins, ways = self.lines(numbers)
         placement = self._around.caster.at(numbers)
@@ -69,13 +68,58 @@ class BeamsTogether(Rows):
         return places, rotated_each(turns, self._directions)
 
 
-def body_of(at: Mounting) -> Body:
-    """Return the body of the robot that a component is on. Raises BadValue without one."""
-    made = at.robot.kind.factory(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
-    body: Body | None = made.body()
-    if body is None:
-        raise BadValue("it sends rays from a robot without a body", at.robot.name)
-    return body
+class BeamSensor(Sensor):
+    """A sensor of the distances along beams, each from where the beam leaves the robot: of its mount, or its hull."""
+
+    field: ClassVar[str] = "distances"
+    """That of its reading."""
+    beams: Beams
+    hull_m: Sequence[float] = ()
+    """Where a distance begins on each beam; empty: at the mount."""
+    least_m: float = 0.0
+    range_m: float
+
+    def reading(self, distances: list[float]) -> Any:
+        """Return the reading with these distances."""
+        return None
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest distance (m); where nothing is met it is the greatest."""
+        return {self.field: (min(self.least_m, self.range_m), self.range_m)}
+
+    def sample(self, view: View) -> Any:
+        return self.reading(self.together([self]).sample(view)[0].tolist())
+
+    @staticmethod
+    def together(sensors: Sequence[Any]) -> Any:
+        """Return these as one; all have as many beams."""
+        return Distances(sensors)
+
+    @staticmethod
+    def rays(sensors: Sequence[BeamSensor], numbers: Sequence[float]) -> Floats:
+        """Return both ends of each beam: where its distance begins, and the first thing or the sensor's range."""
+        found = []
+        for one in sensors:
+            hull = np.array(one.hull_m or [0.0])
+            found.append(BeamsTogether([one.beams]).ends(numbers, hull, hull + one.range_m))
+        return np.concatenate(found)
+
+
+class Distances(Rows):
+    """Several sensors, with as many beams."""
+
+    def __init__(self, sensors: Sequence[BeamSensor]) -> None:
+        self._beams = BeamsTogether([one.beams for one in sensors])
+        self._hulls = np.array([one.hull_m for one in sensors]) if sensors[0].hull_m else None
+        self._least = np.array([[one.least_m] for one in sensors])
+        self._ranges = np.array([[one.range_m] for one in sensors])
+
+    def sample(self, view: View) -> Floats:
+        """Return the distances (m), of shape (sensors, beams)."""
+        found = self._beams.distances(view)
+        if self._hulls is not None:
+            found = found - self._hulls
+        return np.asarray(np.minimum(np.maximum(found, self._least), self._ranges))
 
 
 def hull_middle(link: Link) -> Vector:

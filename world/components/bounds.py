@@ -75,7 +75,8 @@ class CommandBounds:
         numbers = self._codec.numbers(command)
         size = len(numbers)
         if size != self._size:
-            self._keep_ends(size)
+            bounds = bounds_of(self._made, self._codec.fields, size)
+            self._size, self._ends = size, (tuple([low for low, _ in bounds]), tuple([high for _, high in bounds]))
         low, high = self._ends
         if len(low) != size or not all(map(isfinite, numbers)):
             return None
@@ -97,10 +98,6 @@ class CommandBounds:
             if value != limit
         ]
         return within, beyond
-
-    def _keep_ends(self, size: int) -> None:
-        bounds = bounds_of(self._made, self._codec.fields, size)
-        self._size, self._ends = size, (tuple(low for low, _ in bounds), tuple(high for _, high in bounds))
 
     def _names(self, size: int) -> Sequence[str]:
         """Return what each number of a command is called."""

@@ -37,6 +37,11 @@ def mounting_of(spec: WorldSpec, layout: Layout, entity: Entity) -> Mounting:
     return Mounting(spec, layout, entity, "", draw_key(spec.seed, "model", entity.name), frozenset(entity.fields))
 
 
+def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
+    """Return an entity as its model."""
+    return entity.kind.factory(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
+
+
 @dataclass(frozen=True, slots=True)
 class MotionMounting:
     """The mounting of a motion: the entities of a layout whose models have it."""

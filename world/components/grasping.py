@@ -10,7 +10,7 @@ from foosim.common import units
 from foosim.common.spec_base import default
 from foosim.common.units import Quantity
 from foosim.world.component_types.settings import ActuatorSettings, Tag
-from foosim.world.components.entities import mounting_of
+from foosim.world.components.entities import made_model
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import Entity, Layout
 from foosim.world.placing import FIRST_LINK, MountedAt
@@ -62,7 +62,7 @@ def _portables_of(spec: WorldSpec, layout: Layout) -> tuple[Portable, ...]:
         if entity.is_robot or not entity.kind.couples:
             continue
         settings = spec.settings_of(entity.name)
-        body: Body | None = entity.kind.factory(settings, mounting_of(spec, layout, entity)).body()
+        body: Body | None = made_model(spec, layout, entity).body()
         if body is None:
             continue
         low, high = swept_box(body)

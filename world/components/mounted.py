@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from foosim.common.names import nearest_quoted
 from foosim.world.components.base import Sensor
-from foosim.world.components.entities import mounting_of
+from foosim.world.components.entities import made_model
 from foosim.world.components.rows import Rows
 from foosim.world.components.view import IncompatibleComponent, Mounting
 from foosim.world.kinematics import Twist, forward_kinematics, twist
@@ -102,8 +102,7 @@ def free_poses(state: Floats, back: Floats, centres: Floats) -> tuple[Floats, Fl
 
 def body_at(at: Mounting) -> Body:
     """Return the body of the robot that a component is on. Raises IncompatibleComponent for one without."""
-    model = at.robot.kind.factory(at.spec.settings_of(at.robot.name), mounting_of(at.spec, at.layout, at.robot))
-    body: Body | None = model.body()
+    body: Body | None = made_model(at.spec, at.layout, at.robot).body()
     if body is None:
         raise IncompatibleComponent(("kind",), f"{at.robot.name} has no body to carry it", at.robot.model)
     return body

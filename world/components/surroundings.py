@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import NamedTuple
 
-from foosim.world.components.entities import mounting_of
+from foosim.world.components.entities import made_model
 from foosim.world.components.view import SensingView, View
 from foosim.world.fixed_scenery import fixed_shapes
 from foosim.world.kinematics import forward_kinematics
@@ -100,11 +100,7 @@ class Surroundings:
 
     def _made_bodies(self) -> dict[str, Body]:
         spec, layout = self._spec, self._layout
-        models = {
-            one.name: one.kind.factory(spec.settings_of(one.name), mounting_of(spec, layout, one))
-            for one in layout.entities
-            if one.name != WORLD
-        }
+        models = {one.name: made_model(spec, layout, one) for one in layout.entities if one.name != WORLD}
         return {name: body for name, model in models.items() if (body := model.body()) is not None}
 
     @staticmethod

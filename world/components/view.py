@@ -30,11 +30,12 @@ Result = TypeVar("Result")
 class ComponentError(Failed):
     """A component has raised, or returned an invalid value: each node that computes its tick would fail as it did.
 
-    `component` is its name on `entity`, `cause` has its traceback.
+    `component` is its name on `entity`, which is empty, or the world, for other components; `cause` has its traceback.
     """
 
     def __init__(self, component: str, entity: str, tick: int, cause: BaseException) -> None:
-        super().__init__(f"{called_of(component, entity)} failed at tick {tick}: {failure_of(cause)}")
+        whose = {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
+        super().__init__(f"{component}{whose} failed at tick {tick}: {failure_of(cause)}")
         self.component, self.entity, self.tick, self.cause = component, entity, tick, cause
 
 
@@ -45,11 +46,6 @@ class IncompatibleComponent(BadValue):
     def __init__(self, path: Location, what: str, value: object, nearest: str | None = None) -> None:
         super().__init__(what, value, nearest)
         self.path = path
-
-
-def called_of(component: str, entity: str) -> str:
-    """Return the component and its entity in words; `entity` is empty, or that of the world, for other components."""
-    return component + {"": "", WORLD: " of the world"}.get(entity, f" of {entity}")
 
 
 def component_error(component: str, entity: str, tick: int, error: BaseException) -> ComponentError:
@@ -145,25 +141,6 @@ def some_together(what: str, tick: int, made: Any, members: Sequence[Any], rows:
         return called(what, "", tick, made.taken, rows)
     some = [members[row] for row in rows.tolist()]
     return called(what, "", tick, type(some[0]).together, some)
-
-
-class SlotReadings:
-    """The readings of several sensors that are numbers of the frame as they are: read as one array."""
-
-    def __init__(self, places: Sequence[Sequence[int]] | NDArray[np.intp]) -> None:
-        """`places` are those of each sensor's numbers, of one length."""
-        import numpy as np
-
-        self._places = np.array(places)
-
-    def taken(self, rows: NDArray[np.intp]) -> SlotReadings:
-        """Return those of some of the sensors, by their rows."""
-        return SlotReadings(self._places[rows])
-
-    def sample(self, view: View) -> NDArray[np.float64]:
-        """Return the numbers, of shape (sensors, numbers)."""
-        numbers: NDArray[np.float64] = view.values[self._places]
-        return numbers
 
 
 class WritableView(View):

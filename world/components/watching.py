@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import wraps
 from typing import Any, Final, NoReturn
 
-from foosim.world.components.fitted import BoundActuator, BoundModifier
+from foosim.world.components.fitted import BoundActuator
 from foosim.world.components.view import View
 
 ALONE: Final = "numbers of a frame are written by view.write alone"
@@ -79,8 +79,5 @@ def guarded(made: Any) -> Any:
 
 def guarded_actuator(one: BoundActuator) -> BoundActuator:
     """Return an actuator with a guard, and guards of its modifiers."""
-    return replace(one, actuator=guarded(one.actuator), modifiers=tuple(map(_guarded_modifier, one.modifiers)))
-
-
-def _guarded_modifier(one: BoundModifier) -> BoundModifier:
-    return replace(one, modifier=guarded(one.modifier))
+    modifiers = tuple([replace(its, modifier=guarded(its.modifier)) for its in one.modifiers])
+    return replace(one, actuator=guarded(one.actuator), modifiers=modifiers)

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from foosim.world.components.entities import MotionMounting
+from foosim.world.components.entities import MotionMounting, made_model
 from foosim.world.components.view import Slot, WritableView
 from foosim.world.kinematics import forward_kinematics
 from foosim.world.layout import WORLD, Entity
@@ -34,7 +34,7 @@ from foosim.world.moving.solids import (
     solid,
     solids,
 )
-from foosim.world.moving.upright import is_upright, made_model, upright_of
+from foosim.world.moving.upright import is_upright, upright_of
 from foosim.world.scene import Body, Shape, place, swept_box
 
 Flags: TypeAlias = NDArray[np.bool_]

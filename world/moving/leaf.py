@@ -11,11 +11,11 @@ from collections.abc import Iterator, Sequence
 from math import sqrt
 from typing import Final, NamedTuple
 
-from foosim.world.components.entities import MotionMounting
+from foosim.world.components.entities import MotionMounting, made_model
 from foosim.world.layout import WORLD, Entity
 from foosim.world.moving.free_way import placed_shapes
 from foosim.world.moving.solids import solid
-from foosim.world.moving.upright import is_upright, made_model, upright_of
+from foosim.world.moving.upright import is_upright, upright_of
 from foosim.world.scene import Body
 
 ROUNDING_M: Final = 1e-9

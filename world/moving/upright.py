@@ -12,10 +12,7 @@ from typing import Any
 
 from foosim.world.component_types.descriptions import overrides
 from foosim.world.component_types.settings import EntitySettings
-from foosim.world.components.entities import mounting_of
-from foosim.world.layout import Entity, Layout
 from foosim.world.scene import Body, Capsule, Cylinder, Sphere, shape_box
-from foosim.world.spec import WorldSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +22,6 @@ class Upright:
     radius: float
     low: float
     high: float
-
-
-def made_model(spec: WorldSpec, layout: Layout, entity: Entity) -> Any:
-    """Return an entity as its model."""
-    return entity.kind.factory(spec.settings_of(entity.name), mounting_of(spec, layout, entity))
 
 
 def stands_upright(settings: EntitySettings) -> bool:

@@ -71,10 +71,6 @@ class Bundles(NamedTuple):
         fan = starts // rays
         return cls(origins[:, fan], ranges[fan], passing[fan], starts, lengths, ways.reshape(3, -1))
 
-    def are_even(self, length: int) -> bool:
-        """Whether all bundles have as many rays as this."""
-        return self.ways.shape[1] == length * len(self.starts) and int(self.lengths.min()) == length
-
     def box(self) -> tuple[Floats, Floats]:
         """Return the least and the greatest coordinates of each bundle (3, b)."""
         if not len(self.starts):
@@ -181,7 +177,7 @@ def _passing_near(placed: Placed, bundles: Bundles, bundle: Indices, shapes: Ind
             x, y, z, square, ranges, radii = (column[near] for column in (x, y, z, square, ranges, radii))
             bundle, shapes, origins = bundle[near], shapes[near], origins[:, near]
     first, beyond = bundles.starts[bundle], square - radii * radii
-    if bundles.are_even(length):
+    if bundles.ways.shape[1] == length * len(bundles.starts) and int(bundles.lengths.min()) == length:  # so of all
         dx, dy, dz = bundles.ways.reshape(3, -1, length).take(bundle, axis=1)
     else:
         dx, dy, dz = bundles.ways[:, first[:, None] + np.arange(length)]
