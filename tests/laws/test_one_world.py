@@ -220,7 +220,7 @@ def assert_repeats(path: Path, draw: Random, usual: Ran) -> None:
 def test_on_many_nodes_without_losses() -> None:
     """Engines that are never rebuilt have other pasts than rebuilt ones."""
     for name in ("table", "everything"):
-        assert run(world_of(name), 8, PATIENT).digests == alone(name).digests, name
+        assert run(world_of(name), 5, PATIENT).digests == alone(name).digests, name
 
 
 # --- every component type ------------------------------------------------------------------------------------------

@@ -71,7 +71,7 @@ class Course:
 
 @cache
 def one_crate() -> Course:
-    return Course(2_000, 2, sets=ONE_CRATE)
+    return Course(1_800, 2, sets=ONE_CRATE)
 
 
 def test_a_crate_comes_over_the_border_into_the_zone() -> None:

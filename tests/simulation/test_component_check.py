@@ -422,12 +422,11 @@ def test_a_terminal_shows_where_it_is_and_an_interrupt_says_so(planted: Path) ->
 
 def test_files_beside_the_deployment_are_found_from_any_folder(planted: Path, command: Command) -> None:
     """Meshes are relative to the folder of the deployment."""
-    (planted / "own_form.py").write_text(HEAD + SENSOR.format(value=GOOD))
     folder = planted / "elsewhere"
     folder.mkdir()
     (folder / "thing.obj").write_text(TETRAHEDRON)
-    thing = "scenery={thing: {shape: mesh, file: thing.obj, x: 3 m, z: 1 m, radio: wood}}"
-    text = apply_sets(TABLE.read_text(), TABLE.name, [*SETS, OF_ROD, "engine=bullet", thing])
-    (folder / "table.yaml").write_text(text)
-    done = command("check-component", "own", "--in", folder / "table.yaml", "--ticks", "20")
+    thing = {"shape": "mesh", "file": "thing.obj", "x": "3 m", "z": "1 m", "radio": "wood"}
+    base = {"model": "holonomic", "sensors": {"where": {"kind": "pose", "rate": "10 Hz"}}}
+    (folder / "yard.yaml").write_text(yard_text({"base": base}, engine="mujoco", scenery={"thing": thing}))
+    done = command("check-component", "pose", "--in", folder / "yard.yaml", "--ticks", "20")
     assert done.code == 0, done

@@ -34,7 +34,7 @@ SEED: Final = 5
 def test_a_run_disturbed_by_every_fault_is_the_run_that_would_have_been(house: House) -> None:
     """On links that delay and stall; `end` compares the digests of all ticks with an undisturbed rehearsal's."""
     nodes = dict.fromkeys(("red", "blue"), NODE)
-    with Cluster(house.folder, "faults", SETS, pace="0.1x", seed=SEED, weather=BAD, programs=nodes) as cluster:
+    with Cluster(house.folder, "faults", SETS, pace="0.05x", seed=SEED, weather=BAD, programs=nodes) as cluster:
         trial = Trial(cluster, random.Random(SEED), calm_s=(0.0, 0.05))
         for fault in (*FAULTS, twin_refused):
             fault(trial)

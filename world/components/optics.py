@@ -37,7 +37,7 @@ class Optics:
 def moving_links(bodies: Mapping[str, Body]) -> list[tuple[str, int]]:
     """Return the links whose pose is not constant, as (body, index of the link): by bodies in name order.
 
-    The place in the list is the link's number in the readings of cameras.
+    The place in the list is the link's number for what draws it.
     """
     found = []
     for name, body in sorted(bodies.items()):
