@@ -162,7 +162,7 @@ def choice() -> str:
 def kernels() -> Extension:
     """Return the extension of the kernels: C for Python 3.11 and any later one, by its stable interface."""
     files = sorted(map(str, Path("kernels").glob("*.c")))
-    options = ["-O3", "-fno-math-errno", *EXACT]
+    options = ["-O3", "-fno-math-errno", "-fno-trapping-math", *EXACT]  # neither errno nor flags of exceptions are read
     sources = ["kernels/kernels.c"]  # it includes the others
     name = f"{LIBRARY}.kernels._kernels"
     return Extension(name, sources, depends=files, extra_compile_args=options, py_limited_api=True)

@@ -96,14 +96,14 @@ def refusals(run: Path, tmp_path: Path) -> Iterator[tuple[tuple[str | Path, ...]
     yield (run, "--to", "-1 s", "-o", out), "--to: negative; a time is at least 0"
     yield (run, "--from", "300 ms", "--to", "200 ms", "-o", out), "--to: before --from, which is 300 ms, '200 ms'"
     yield (run, "-o", run), "exists already; a capture is never overwritten"
-    yield (run, "-o", run / "o.mcap"), "cannot be created, File exists"
+    yield (run, "-o", run / "o.mcap"), "cannot be written, Not a directory"
 
 
 def test_bad_input_is_named_and_leaves_no_file(run: Path, tmp_path: Path) -> None:
     before = sorted(tmp_path.iterdir())
     for arguments, text in refusals(run, tmp_path):
         done = replay("cut", *arguments)
-        assert done.code == (1 if "cannot be created" in text else 2) and text in done.err, done
+        assert done.code == (1 if "cannot be written" in text else 2) and text in done.err, done
     assert sorted(tmp_path.iterdir()) == before
 
 
