@@ -12,9 +12,9 @@ SEED ?= 17
 # Where Python is told to write no bytecode, each process compiles all of foosim when it starts: a third of its start.
 export PYTHONDONTWRITEBYTECODE :=
 
-# One worker more than cores, since tests of real processes wait for these; at most 8. The shell's PYTHONPATH (ROS sets
+# Two workers more than cores, since tests of real processes wait for these; at most 8. The shell's PYTHONPATH (ROS sets
 # one) would load other people's pytest plugins.
-WORKERS := $(shell echo $$(($$(nproc) < 8 ? $$(nproc) + 1 : 8)))
+WORKERS := $(shell echo $$(($$(nproc) < 7 ? $$(nproc) + 2 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
 .PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components corpus robots machines lint page pictures bench compiled clean environment checks second
