@@ -58,24 +58,11 @@ def export(  # noqa: PLR0913, PLR0917  # a command's options
     the captured frames.
     """
     if images is not None or video:
-        if images is not None and video:
-            raise BadValue("--images and --video are two exports", images)
         if what != "packets" or form is not None:
             raise BadValue("--what and --format are of tables, not of --images and --video", form or what)
         if out == STANDARD_OUTPUT:
             raise BadValue("--out: pictures need a folder or a file", str(out))
-        if images is not None and images not in IMAGES:
-            raise UnknownName("--images: not a kind of pictures", images, IMAGES)
-        first_ns, last_ns = span = time_of("--from", begin) or 0, time_of("--to", end)
-        if last_ns is not None and last_ns < first_ns:
-            raise BadValue("--to is before --from", f"{end} and {begin}")
-        form_of = "video" if video else str(images)
-        with reading():
-            count = export_pictures(capture, out, form_of, camera or ["*"], span, simulated_again)
-        if json:
-            print_json({"path": str(out), "pictures": count})
-        else:
-            typer.echo(f"{out}: {count} pictures")
+        _export_pictures(capture, out, images, video, camera or ["*"], (begin, end), json)
         return
     if camera or begin or end:
         given = ", ".join(filter(None, [*(camera or []), begin, end]))
@@ -88,6 +75,30 @@ def export(  # noqa: PLR0913, PLR0917  # a command's options
         print_json(content, sys.stderr if out == STANDARD_OUTPUT else None)
     elif out != STANDARD_OUTPUT:
         typer.echo(f"{done.path}: {done.rows} rows of {what}, {len(done.columns)} columns")
+
+
+def _export_pictures(
+    capture: Path,
+    out: Path,
+    images: str | None,
+    video: bool,
+    cameras: list[str],
+    span: tuple[str | None, ...],
+    json: bool,
+) -> None:
+    if images is not None and video:
+        raise BadValue("--images and --video are two exports", images)
+    if images is not None and images not in IMAGES:
+        raise UnknownName("--images: not a kind of pictures", images, IMAGES)
+    first_ns, last_ns = time_of("--from", span[0]) or 0, time_of("--to", span[1])
+    if last_ns is not None and last_ns < first_ns:
+        raise BadValue("--to is before --from", f"{span[1]} and {span[0]}")
+    with reading():
+        count = export_pictures(capture, out, images or "video", cameras, (first_ns, last_ns), simulated_again)
+    if json:
+        print_json({"path": str(out), "pictures": count})
+    else:
+        typer.echo(f"{out}: {count} pictures")
 
 
 def _format(text: str | None) -> Format | None:

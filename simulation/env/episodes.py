@@ -118,14 +118,7 @@ class Episodes:
             raise BadValue("an environment has one agent or more", list(agents))
         if seconds is not None and not seconds > 0.0:
             raise BadValue("seconds of an episode are more than 0", seconds)
-        if pixels is not None and camera is not None:
-            raise BadValue("a camera has its own pixels: an environment takes camera or pixels", str(pixels))
-        if not all(0 < side <= PIXELS_MAX for side in pixels or PIXELS):
-            raise BadValue(f"pixels are a width and a height, each of 1 to {PIXELS_MAX}", str(pixels))
-        names = {f"{robot}/{channel}": its for (robot, channel), its in cameras_of(deployment).items()}
-        valid = [name for name, its in names.items() if "image" in its.pictures]
-        if camera is not None and camera not in valid:
-            raise UnknownName("no camera with images", camera, valid)
+        _check_view(deployment, pixels, camera)
         self.ticks = _ticks(rate_hz, deployment.tick_ns)
         self.rate_hz = rate_hz
         self._start = read_branch(start, deployment).start if isinstance(start, str) else start
@@ -291,6 +284,18 @@ class Episodes:
         """Free the engines."""
         self.is_running = False
         self.simulation.close()
+
+
+def _check_view(deployment: Deployment, pixels: tuple[int, int] | None, camera: str | None) -> None:
+    """Raise BadValue or UnknownName for a view that cannot be rendered."""
+    if pixels is not None and camera is not None:
+        raise BadValue("a camera has its own pixels: an environment takes camera or pixels", str(pixels))
+    if not all(0 < side <= PIXELS_MAX for side in pixels or PIXELS):
+        raise BadValue(f"pixels are a width and a height, each of 1 to {PIXELS_MAX}", str(pixels))
+    names = {f"{robot}/{channel}": its for (robot, channel), its in cameras_of(deployment).items()}
+    valid = [name for name, its in names.items() if "image" in its.pictures]
+    if camera is not None and camera not in valid:
+        raise UnknownName("no camera with images", camera, valid)
 
 
 def _ticks(rate_hz: float, tick_ns: int) -> int:
