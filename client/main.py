@@ -16,7 +16,7 @@ import typer
 
 from foosim.client.core import ClientCore
 from foosim.client.errors import PlayerError
-from foosim.client.loading import look_in
+from foosim.client.loading import load_player, look_in
 from foosim.client.playing import PlayerLoop, report_failure
 from foosim.common.errors import BadValue
 from foosim.common.names import is_name
@@ -52,10 +52,11 @@ class ClientShell:
         session: Session,
         world: str = "",
         credentials: Credentials | None = None,
-        driver: Callable[[ClientCore], Driver] = PlayerLoop,
+        driver: Callable[[ClientCore], Driver] | None = None,
     ) -> None:
+        """`driver` acts for the client; by default the player of its name."""
         self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world, FileCache())
-        self._driver = driver(self.core)
+        self._driver = PlayerLoop(self.core, load_player) if driver is None else driver(self.core)
         self._failure: PlayerError | None = None
         self._is_present = self._is_stopped = False
         self._shell = RoleShell(process, name, self.core, lambda now_ns: self._deadline_ns(), credentials)

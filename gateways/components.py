@@ -39,10 +39,10 @@ def components_of(deployment: Deployment, settings: GatewaySettings) -> dict[str
         its, label = deployment.robots[robot], label_of(deployment, robot)
         if len(settings.robots) > 1:
             found |= {f"{robot}.{one.channel}": one for one in radios(deployment, robot)}
-        for channel, one in {**its.sensors, **its.actuators}.items():
+        for channel, one in (*its.sensors.items(), *its.actuators.items()):
             if one.kind != "job":
                 row = row_of(one, settings.classes.get(f"{robot}.{channel}", ""))
-                name = f"{label}.{getattr(one, 'label', None) or channel}"
+                name = f"{label}.{one.label or channel}"
                 found[f"{robot}.{channel}"] = Component(name, robot, channel, one, deployment, row)
     return found
 

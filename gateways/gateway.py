@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.finding import Finding
 from foosim.deployment.schema import Deployment
 from foosim.gateways.components import components_of
-from foosim.gateways.rows import Component
-
-if TYPE_CHECKING:
-    from foosim.gateways.run import Run
-    from foosim.world.component_types.settings import GatewaySettings
+from foosim.gateways.run import Listener, Run
+from foosim.gateways.supervision import Supervision
+from foosim.world.component_types.settings import GatewaySettings
 
 
 class Peer(NamedTuple):
@@ -29,15 +27,16 @@ class Peer(NamedTuple):
     messages: int
 
 
-class Gateway:
+class Gateway(Listener):
     """A kind of gateway. The hooks do nothing."""
 
     type_name: ClassVar = "gateway"
 
-    def __init__(self, settings: Any, run: Run) -> None:
+    def __init__(self, settings: Any, run: Run, supervision: Supervision) -> None:
         """`settings` are of the class with which the kind is registered."""
         self.settings: Final = settings
         self.run: Final = run
+        self.supervision: Final = supervision
         self.log: Final = logging.getLogger(run.name)
 
     @staticmethod
@@ -48,12 +47,6 @@ class Gateway:
     async def open(self) -> str:
         """Listen; return where, for the log. Raises Refused."""
         return ""
-
-    def arrived(self, component: Component) -> None:
-        """A reading has arrived: its fields are in `component.fields`, its time in `component.time_ns`."""
-
-    def advanced(self) -> None:
-        """The newest tick that is known, `run.tick`, has changed."""
 
     def go(self) -> bool:
         """A tick waits for the gateway, whose settings have `sync`; return whether it may continue, else call

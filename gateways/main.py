@@ -20,13 +20,16 @@ from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.main import ClientShell, Sessions
 from foosim.client.player import Packet
 from foosim.common.errors import BadValue, UnknownName
+from foosim.gateways.gateway import Gateway
 from foosim.gateways.run import Run
+from foosim.gateways.supervision import Supervision
 from foosim.protocol.channels import Plane
 from foosim.runtime.command import PkiOption, new_app
 from foosim.runtime.process import Stop, die_with_parent
 from foosim.runtime.roles.shell import RUN, Process, address_of
 from foosim.runtime.run_folder import RunFolder, open_run
 from foosim.runtime.transport.certificates import operator_credentials
+from foosim.world.component_types.registry import find
 
 WAIT_S_MAX: Final = 60.0
 REPORT_S: Final = 1.0
@@ -38,28 +41,29 @@ class Endpoint:
 
     def __init__(self, core: ClientCore) -> None:
         self.core: Final = core
-        self._run: Run | None = None
-        self._robot = ""
+        self._gateway: Gateway | None = None
+        self._robot, self._waits_at = "", -1
 
-    def join(self, run: Run, robot: str) -> None:
+    def join(self, gateway: Gateway, robot: str) -> None:
         """Take part, and receive the components of a robot; without one in lockstep, where the gateway has `sync`."""
-        self._run, self._robot = run, robot
+        self._gateway, self._robot, run = gateway, robot, gateway.run
         rate_hz = run.deployment.clients[self.core.name].rate_hz
         self.core.join(0 if rate_hz is None else run.deployment.ticks(rate_hz), run.heard(robot))
 
     def step(self, now_ns: int) -> None:
         """Hand on what has arrived; a tick that waits continues when the gateway lets it."""
-        core, run = self.core, self._run
-        if run is None:
+        core, gateway = self.core, self._gateway
+        if gateway is None:
             return
+        run = gateway.run
         if core.arrivals:
             packets = [*core.arrivals]
             core.arrivals.clear()
             run.arrived(self._robot, packets, core.tick)
-        if core.go is not None and core.tick > run.waits_at:
-            run.waits_at = core.tick
+        if core.go is not None and core.go.number > self._waits_at:
+            self._waits_at = core.go.number
             run.arrived(self._robot, core.go.packets, core.tick)
-            if run.gateway.go():
+            if gateway.go():
                 run.proceed()
 
     def deadline_ns(self) -> int:
@@ -75,46 +79,48 @@ class GatewayProcess:
     ) -> None:
         """`operate` makes an operator's session. `folder` is that of the run, where it is on this machine."""
         self._name, self._sessions, self._stop, self._operate, self._folder = name, sessions, stop, operate, folder
-        self._process = Process(name, is_shared=True)
+        self._process = Process(name, is_shared=True, on_offer=self._schedule)
         self._shells: dict[str, ClientShell] = {}
         self._endpoints: dict[str, Endpoint] = {}
         self._timer: asyncio.TimerHandle | None = None
-        self._has_round = False
-        """Whether a round is scheduled."""
-        self._changed = asyncio.Event()
-        """Set after each round."""
+        self._turned = asyncio.Event()
+        """Set after each turn."""
+        self._is_over = False
+        self._failure: BaseException | None = None
 
     async def serve(self) -> int:
         """Serve until the run ends; return the exit code. Raises Refused."""
         self._loop = asyncio.get_running_loop()
-        self._process.inbox.on_offer = self._schedule
         self._stop.then(self._schedule)
-        core = self._add(self._name).core
         self._process.loop.begin()
+        core = self._add(self._name).core
         await self._until(lambda: core.deployment is not None)
-        if core.deployment is None:
-            return self._process.exit_code()
         deployment = core.deployment
+        if deployment is None:
+            return self._process.end()
         if self._name not in deployment.gateways:
             raise UnknownName("no gateway of the deployment", self._name, deployment.gateways)
-        run = Run(deployment, self._name, self._send, self._proceed, self._operate)
+        run = Run(deployment, self._name, self._send, self._proceed)
+        supervision = Supervision(run, self._operate)
+        gateway: Gateway = find("gateway", run.settings.kind).factory(run.settings, run, supervision)
+        run.listeners.extend((supervision, gateway))
         for client in run.clients.values():
             if client != self._name:
                 self._add(client)
         await self._until(lambda: all(shell.core.deployment is not None for shell in self._shells.values()))
-        where = await run.gateway.open()
-        run.gateway.log.info("%s serves %d robots: %s", self._name, len(run.robots), where)
+        where = await gateway.open()
+        gateway.log.info("%s serves %d robots: %s", self._name, len(run.robots), where)
         for robot, client in run.clients.items():
-            self._endpoints[client].join(run, robot)
-        tasks = [asyncio.create_task(run.supervision.follow()), asyncio.create_task(self._report_peers(run))]
+            self._endpoints[client].join(gateway, robot)
+        tasks = [asyncio.create_task(supervision.follow()), asyncio.create_task(self._report_peers(gateway))]
         try:
-            await self._until(lambda: False)
+            await self._until(lambda: False)  # the run ends
         finally:
             for task in tasks:
                 task.cancel()
-            run.supervision.close()
-            await run.gateway.close()
-        return self._process.exit_code()
+            supervision.close()
+            await gateway.close()
+        return self._process.end()
 
     def _add(self, client: str) -> ClientShell:
         """Add a client of the gateway. Raises Refused."""
@@ -142,42 +148,46 @@ class GatewayProcess:
             shell.role.perform()
 
     async def _until(self, reached: Callable[[], bool]) -> None:
-        """Wait until something is reached or the process is over. Raises Refused."""
-        while not (reached() or self._process.is_over()):
-            self._changed.clear()
-            await self._changed.wait()
+        """Wait until something is reached or the process is over. Raises what a turn has raised."""
+        while not (reached() or self._is_over):
+            self._turned.clear()
+            await self._turned.wait()
+            if self._failure is not None:
+                raise self._failure
 
     def _schedule(self) -> None:
-        """Have a round soon; from any thread."""
-        if not self._has_round:
-            self._has_round = True
-            self._loop.call_soon_threadsafe(self._go_round)
+        """Have a turn soon; from any thread."""
+        self._loop.call_soon_threadsafe(self._turn)
 
-    def _go_round(self) -> None:
+    def _turn(self) -> None:
         """Run a round of the process's loop, and set the timer for the next one."""
-        self._has_round = False
-        if self._stop.is_set():
-            self._process.stop()
-        process = self._process.loop
-        process.go_round(waits=False)
         if self._timer is not None:
             self._timer.cancel()
-        wait_s = max(0.0, (process.due_ns() - time.monotonic_ns()) / 1e9)
-        self._timer = self._loop.call_later(min(wait_s, WAIT_S_MAX), self._go_round)
-        self._changed.set()
+        if self._stop.is_set():
+            self._process.stop()
+        try:
+            next_ns = None if self._is_over else self._process.step()
+        except BaseException as error:  # noqa: BLE001  # it is raised where the process waits
+            self._failure, next_ns = error, None
+        if next_ns is None:
+            self._is_over = True
+        else:
+            wait_s = min(max(0.0, (next_ns - time.monotonic_ns()) / 1e9), WAIT_S_MAX)
+            self._timer = self._loop.call_later(wait_s, self._turn)
+        self._turned.set()
 
-    async def _report_peers(self, run: Run) -> None:
+    async def _report_peers(self, gateway: Gateway) -> None:
         """Write the programs at the gateway with their rates, in messages a second."""
         known: dict[tuple[str, str], int] = {}
         while self._folder is not None:
             await asyncio.sleep(REPORT_S)
-            peers = [*run.gateway.peers()]
+            peers = [*gateway.peers()]
             rates = [(one.messages - known.get(one[:2], 0)) / REPORT_S for one in peers]
             known = {one[:2]: one.messages for one in peers}
             found = [{"name": one.name, "what": one.what, "hz": rate} for one, rate in zip(peers, rates, strict=True)]
             with suppress(OSError):  # the console shows the last one
                 self._folder.write_gateway(
-                    self._name, {"kind": run.settings.kind, "robots": [*run.robots], "programs": found}
+                    self._name, {"kind": gateway.settings.kind, "robots": [*gateway.run.robots], "programs": found}
                 )
 
 

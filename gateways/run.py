@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from foosim.client.commands import CommandEncoder
-from foosim.client.control import Control
 from foosim.client.jobs import Job, Jobs
 from foosim.client.player import Packet
 from foosim.client.playing import Newest
@@ -21,12 +20,9 @@ from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.channel_kinds import channels_of
 from foosim.deployment.schema import Deployment
 from foosim.gateways.components import RADIO, RECEIVED, components_of
-from foosim.gateways.gateway import Gateway
 from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, label_of
-from foosim.gateways.supervision import Supervision
 from foosim.protocol.messages import Received
 from foosim.world.component_types.jobs import JobState
-from foosim.world.component_types.registry import find
 
 Send = Callable[[str, Packet], None]
 """Sends a packet of the client with a name."""
@@ -42,6 +38,16 @@ class Called:
     ended: Callable[[Called], None]
 
 
+class Listener:
+    """What follows a run. The hooks do nothing."""
+
+    def arrived(self, component: Component) -> None:
+        """A reading has arrived: its fields are in `component.fields`, its time in `component.time_ns`."""
+
+    def advanced(self) -> None:
+        """The newest tick that is known, `Run.tick`, has changed."""
+
+
 class Run:
     """The run of a gateway."""
 
@@ -51,19 +57,15 @@ class Run:
         name: str,
         send: Send,
         proceed: Callable[[], None],
-        operate: Callable[[], Control],
     ) -> None:
-        """`name` is the gateway's. `proceed` continues the tick that waits for it; `operate` makes the session of an
-        operator, and may wait."""
+        """`name` is the gateway's. `proceed` continues the tick that waits for it."""
         self.deployment: Final = deployment
         self.name: Final = name
         self.settings: Final = deployment.gateways[name]
         self.proceed: Final = proceed
         self.tick = -1
         """The newest that is known."""
-        self.waits_at = -1
-        """The last tick that has waited for the gateway."""
-        self.supervision: Final = Supervision(self, operate)
+        self.listeners: Final[list[Listener]] = []
         self.clients: Final = self.settings.clients(name)
         """The names of the gateway's clients by robot; its own one is that of no robot."""
         self.robots: Final = {label_of(deployment, robot): robot for robot in self.settings.robots}
@@ -77,7 +79,6 @@ class Run:
         self._jobs: dict[str, Jobs] = {}
         self._called: list[Called] = []
         self._encoder, self._send, self._log = CommandEncoder(deployment), send, logging.getLogger(name)
-        self.gateway: Final[Gateway] = find("gateway", self.settings.kind).factory(self.settings, self)
 
     @property
     def time_s(self) -> float:
@@ -103,8 +104,8 @@ class Run:
         self._reports.take(packets)
         if tick > self.tick:
             self.tick = tick
-            self.supervision.advanced()
-            self.gateway.advanced()
+            for listener in self.listeners:
+                listener.advanced()
         if self._called:
             self._look_at_jobs()
 
@@ -133,12 +134,13 @@ class Run:
     def _deliver(self, component: Component, fields: Fields, packet: Received) -> None:
         component.fields, component.time_ns = fields, packet.sent_ns
         component.count += 1
-        self.gateway.arrived(component)
+        for listener in self.listeners:
+            listener.arrived(component)
 
     # --- to the run ---------------------------------------------------------------------------------------------------
 
     def command(self, component: Component, given: Mapping[str, Any]) -> None:
-        """Send a command by its fields; fields that are not given keep their values. Raises Refused."""
+        """Send a command by its fields; omitted ones keep their values. Raises Refused."""
         fields, numbers = command(component, given)
         component.fields = fields
         component.count += 1

@@ -23,6 +23,7 @@ from foosim.deployment.hosts import Listen
 from foosim.gateways.gateway import Gateway, Peer
 from foosim.gateways.rows import MANAGER, Component, checked
 from foosim.gateways.run import Called, Run
+from foosim.gateways.supervision import Supervision
 from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.registry import gateway
 from foosim.world.component_types.settings import GatewaySettings
@@ -57,8 +58,8 @@ class SocketSettings(GatewaySettings):
 class Socket(Gateway):
     """Streams and services as of MORSE's socket interface."""
 
-    def __init__(self, settings: SocketSettings, run: Run) -> None:
-        super().__init__(settings, run)
+    def __init__(self, settings: SocketSettings, run: Run, supervision: Supervision) -> None:
+        super().__init__(settings, run, supervision)
         self.ports: Final[dict[str, int]] = {}
         """The port of the stream of each component, by name."""
         self._readers: dict[str, set[Connection]] = {name: set() for name in run.components}
@@ -70,7 +71,7 @@ class Socket(Gateway):
             "get_stream_port": self._stream_port,
             "get_all_stream_ports": lambda: self.ports,
         }
-        its = self.run.supervision.services
+        its = supervision.services
         self.services: Final[Mapping[str, Mapping[str, Callable[..., Any]]]] = {
             **its,
             "simulation": {**its["simulation"], **streams},

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from math import sqrt
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -22,11 +22,13 @@ from foosim.common.units import parse_pace
 from foosim.deployment.schema import Deployment
 from foosim.gateways.components import details_of
 from foosim.gateways.rows import euler, label_of
+from foosim.gateways.run import Listener, Run
 from foosim.protocol import channels
 from foosim.protocol.codec import decode
 from foosim.protocol.messages import Commit
 from foosim.runtime.transport.inbox import Inbox, Item
 from foosim.world.assembly.initial_state import initial_frame
+from foosim.world.component_types.payloads import as_float
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.frame import Frame, frame_from_bytes
 from foosim.world.kinematics import forward_kinematics
@@ -34,9 +36,6 @@ from foosim.world.layout import WORLD, Entity
 from foosim.world.rays.shapes import NOTHING
 from foosim.world.scene import Pose, Vector, from_rpy
 from foosim.world.setting.settable import AT, settable
-
-if TYPE_CHECKING:
-    from foosim.gateways.run import Run
 
 T = TypeVar("T")
 _LOG: Final = logging.getLogger("foosim.gateways")
@@ -84,7 +83,7 @@ class World:
         return forward_kinematics(self.surroundings.bodies[entity.name], entity, frame.numbers)[0]
 
 
-class Supervision:
+class Supervision(Listener):
     """The services of the simulator for all programs of a gateway, by component and name: functions of the parameters
     that return the answer, or an awaitable of it. They raise Refused."""
 
@@ -225,7 +224,7 @@ class Supervision:
     # --- time and communication ---------------------------------------------------------------------------------------
 
     async def _sleep(self, seconds: float) -> None:
-        if not isinstance(seconds, int | float) or not 0.0 <= seconds <= SLEEP_S_MAX:
+        if not 0.0 <= as_float(seconds) <= SLEEP_S_MAX:
             raise Refused(f"sleep takes 0 to {SLEEP_S_MAX:g} simulated seconds, not {seconds!r}")
         over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._sleeps.append((self._run.time_s + seconds, over))
