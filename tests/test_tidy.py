@@ -28,7 +28,7 @@ ORDER: list[set[str]] = [
     {"console"},
     {"launcher", "simulation"},
     {"analysis", "fitting"},
-    {"vhub", "library"},
+    {"vhub", "library", "gateways"},
     {"supervisor", "node", "client"},
     {"capture"},
     {"runtime"},

@@ -4,17 +4,34 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Self
 
-from pydantic import Field, PrivateAttr, SerializeAsAny, StringConstraints
+from pydantic import AfterValidator, Field, PrivateAttr, SerializeAsAny, StringConstraints
 
 from foosim.common import limits, names
+from foosim.common.errors import BadValue
 from foosim.common.finding import Location
 from foosim.common.spec_base import Name, Offset, Rate, SpecBase, default
+from foosim.common.units import custom_error
 
 MODIFIERS_MAX: Final = 8
 COMPONENTS_MAX: Final = 16
 TAGS_MAX: Final = 16
+LABEL_LENGTH_MAX: Final = 64
+
+
+def _printable(label: str) -> str:
+    if not label.isprintable():
+        raise custom_error(BadValue("not printable characters", label))
+    return label
+
 
 Tag = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
+Label = Annotated[
+    str,
+    StringConstraints(min_length=1, max_length=LABEL_LENGTH_MAX),
+    AfterValidator(_printable),
+    Field(description=f"1 to {LABEL_LENGTH_MAX} printable characters"),
+]
+"""The name for people and for other programs, in place of the name in the deployment; any printable characters."""
 
 
 class TypedSettings(SpecBase):
@@ -44,11 +61,12 @@ class ModifierSettings(ComponentSettings):
 
 
 class SensorSettings(ComponentSettings):
-    """The settings of each sensor: its rate, and the modifiers of its readings, in order."""
+    """The settings of each sensor: its rate, the modifiers of its readings, in order, and its label."""
 
     rate_hz: Rate = Field(alias="rate")
     offset_ns: Offset = default("0 s", "offset")
     modifiers: list[SerializeAsAny[ModifierSettings]] = Field(default=[], max_length=MODIFIERS_MAX)
+    label: Label = ""
 
     @property
     def carried_bytes(self) -> int | None:
@@ -62,9 +80,10 @@ class SensorSettings(ComponentSettings):
 
 
 class ActuatorSettings(ComponentSettings):
-    """The settings of each actuator: the modifiers of its commands, in order."""
+    """The settings of each actuator: the modifiers of its commands, in order, and its label."""
 
     modifiers: list[SerializeAsAny[ModifierSettings]] = Field(default=[], max_length=MODIFIERS_MAX)
+    label: Label = ""
 
 
 class EntityRuleSettings(ComponentSettings):
@@ -83,11 +102,13 @@ class EntitySettings(TypedSettings):
     """The settings of every entity: its model, a registered name or `module:Class`.
 
     `tags` are found by components and rules, beside the tags of its model. A `spare` is absent until it is added.
+    A `label` is its name at gateways, and changes nothing in the world.
     """
 
     model: str
     spare: bool = False
     tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
+    label: Label = ""
 
     @property
     def felt_surfaces(self) -> Mapping[Location, str]:
