@@ -17,7 +17,8 @@ from foosim.library.mobile.v_w import Motion
 AROUND_M: Final = 6.0  # it stays within this distance of the origin, where nothing is in its way
 NEAR_M: Final = 1.0  # a place is left behind at this distance
 SPEED: Final = 1.0  # m/s
-TURN_GAIN: Final = 2.0  # rad/s for each rad that its place is aside
+TURN_GAIN: Final = 2.0  # rad/s for each rad that its place is aside,
+TURN_MAX: Final = 2.0  # at most this
 
 
 class Mouse(Player):
@@ -41,7 +42,8 @@ class Mouse(Player):
             self._leg += 1
             x, y = self._place()
         aside = shorter(atan2(y - pose.value.y, x - pose.value.x) - pose.value.heading)
-        return {robot: Motion(SPEED * max(cos(aside), 0.0), TURN_GAIN * aside)}
+        turning = min(max(TURN_GAIN * aside, -TURN_MAX), TURN_MAX)
+        return {robot: Motion(SPEED * max(cos(aside), 0.0), turning)}
 
     def _place(self) -> tuple[float, float]:
         """Return where it goes (m): any place of a disc is as likely."""
