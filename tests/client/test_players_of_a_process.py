@@ -19,7 +19,7 @@ import typer
 
 from foosim.client import main as client_main
 from foosim.client.errors import PlayerError
-from foosim.client.main import PlayerShell, run_players
+from foosim.client.main import ClientShell, run_players
 from foosim.client.player import Commands, Player, Samples
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets
@@ -93,7 +93,7 @@ class Bench:
         self.hub_role.connect(wire)
         wire.read(channels.VHUB_READS)
         self.process.loop.add(self.hub_role)
-        self.players = {name: PlayerShell(self.process, name, plane) for name in (RED, BLUE)}
+        self.players = {name: ClientShell(self.process, name, plane) for name in (RED, BLUE)}
         for player in self.players.values():
             self.process.add(player)
 
