@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -54,7 +54,8 @@ def test_nose_to_nose_both_eyes_see_the_mouse_however_it_is_turned() -> None:
     for yaw in range(0, 90, 15):
         with Simulation(FILE, sets=("players={}", f"robots.mouse.at={{x: -4.855 m, yaw: {yaw} deg}}")) as simulation:
             simulation.step(ticks=4)
-            seen = [[one.name for one in simulation.readings[eye].value.objects] for eye in BOTH]
+            looks: list[Any] = [simulation.readings[eye].value for eye in BOTH]
+            seen = [[one.name for one in look.objects] for look in looks]
             assert seen == [["mouse"], ["mouse"]], yaw
 
 

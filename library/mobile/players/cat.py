@@ -56,9 +56,11 @@ class Cat(Player):
         if any((cat, name) not in samples for name in (*EYES, "pose")):
             return {}
         its = self._deployment.robots[cat]
-        looks = [(its.sensors[eye], samples[cat, eye].value) for eye in EYES]
+        looks: list[tuple[Any, Any]] = [(its.sensors[eye], samples[cat, eye].value) for eye in EYES]
         if isinstance(its.actuators["motion"], GoToSettings):
-            return {cat: self._destination(looks, samples[cat, "pose"].value)}
+            pose = samples[cat, "pose"].value
+            assert isinstance(pose, Pose)
+            return {cat: self._destination(looks, pose)}
         left, right = [SEES[type(eye)](eye, seen) for eye, seen in looks]
         return {cat: MOTIONS[left, right]}
 
