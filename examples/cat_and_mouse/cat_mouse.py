@@ -1,7 +1,4 @@
-"""Cat and Mouse as a builder script of MORSE: the world of MORSE's tutorial.
-
-    foosim morse run cat_mouse.py
-"""
+"""Cat and Mouse as a builder script of MORSE: the world of its tutorial."""
 
 from morse.builder import ATRV, Environment, Keyboard, MotionVW, SemanticCamera
 

@@ -1,4 +1,4 @@
-"""The cat's controller of Cat and Mouse, for any server that speaks MORSE's socket protocol: python cat_script.py [PORT]
+"""The cat's controller of Cat and Mouse, for any server that speaks MORSE's socket protocol; it takes the port.
 
 It sends a new motion when what the cameras see has changed, as the tutorial's does.
 """

@@ -1,4 +1,4 @@
-"""The controller of MORSE's tutorial, by the unchanged pymorse of PyPI, catches the mouse in a run of real processes."""
+"""A controller by the unchanged pymorse of PyPI catches the mouse in a run of real processes."""
 
 from __future__ import annotations
 
