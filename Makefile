@@ -2,7 +2,7 @@
 #     make up ARGS='--pace fast --for 20s'
 #     make test ARGS='tests/laws -x'
 
-PACKAGES := analysis capture cli client common console deployment door fitting kernels launcher library node protocol rendering runtime simulation supervisor vhub world
+PACKAGES := analysis capture cli client common console deployment door fitting gateways kernels launcher library node protocol rendering runtime simulation supervisor vhub world
 PYTHON := .venv/bin/python
 SEEDS ?= 100
 FILE ?= deploy/table.yaml

@@ -1,0 +1,1 @@
+"""Gateways: other programs speak with a run in their own language."""

@@ -1,0 +1,1 @@
+"""YARP without YARP: its wire, ports and name server."""
