@@ -1,1 +1,1 @@
-"""Gateways: other programs speak with a run in their own language."""
+"""Gateways: a run for programs of other protocols, such as the clients of MORSE and YARP."""

@@ -23,6 +23,7 @@ PACKAGES: Final = (
         "common",
         "console",
         "deployment",
+        "gateways",
         "kernels",
         "launcher",
         "node",
