@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from asyncio import StreamReader, StreamWriter
+from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from typing import Any, Final, TypeVar
@@ -90,6 +91,8 @@ class Port:
         self.name, self.names, self._receive, self.host = name, names, receive, host
         self.links: dict[str, Link] = {}
         self.sources: dict[StreamWriter, str] = {}
+        self.counts: Counter[str] = Counter()
+        """Messages from and to each port that is or was connected."""
         self._refused = ""
 
     async def open(self, number: int = 0) -> None:
@@ -119,6 +122,7 @@ class Port:
         forms = {text: message("D", values, text) for text in {link.is_text for link in self.links.values()}}
         for link in self.links.values():
             link.send(forms[link.is_text])
+        self.counts.update(self.links.keys())
 
     async def connect(self, place: str) -> str:
         """Add a reader, `CARRIER://NAME` or `/NAME`; return a line about it, raises Refused."""
@@ -185,6 +189,7 @@ class Port:
         command = ""
         while command[:1] != "q":
             command, values = await read_message(stream, carrier.startswith("text"))
+            self.counts[self.sources[writer]] += 1
             reply = await self._perform(command, values)
             if reply is not None and carrier.startswith("text"):
                 writer.write(f"{reply if isinstance(reply, str) else to_text(reply)}\r\n".encode())

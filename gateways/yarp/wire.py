@@ -1,7 +1,7 @@
 """YARP's wire: bottles as bytes and as text, messages, images. `ports` has the connections.
 
 A bottle is a list. Its items are int (32 bits, 64 where it needs them), float (64 bits), str, `Vocab`, bytes, and lists
-of these; None is the vocab `null`, a dict a list of pairs. Integers are little-endian. Measured against YARP 3.5.
+of these; None is the vocab `null`. Integers are little-endian. Measured against YARP 3.5.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def _item(value: Any) -> tuple[int, bytes]:
     if isinstance(value, str | bytes):
         raw = value.encode() if isinstance(value, str) else value
         return STRING if isinstance(value, str) else BLOB, struct.pack("<i", len(raw)) + raw
-    items = [_item(item) for item in (map(list, value.items()) if isinstance(value, dict) else value)]
+    items = [_item(item) for item in value]
     tags = {tag for tag, _ in items}
     common = tags.pop() if len(tags) == 1 else LIST
     if common & LIST:
@@ -101,11 +101,8 @@ def _value(data: bytes, at: int, tag: int, depth: int) -> tuple[Any, int]:
 
 def to_text(value: Any) -> str:
     """Return a bottle as the text carriers have it, or one item."""
-    if isinstance(value, list | tuple | dict):
-        items = map(list, value.items()) if isinstance(value, dict) else value
-        return " ".join(
-            f"({to_text(item)})" if isinstance(item, list | tuple | dict) else to_text(item) for item in items
-        )
+    if isinstance(value, list | tuple):
+        return " ".join(f"({to_text(item)})" if isinstance(item, list | tuple) else to_text(item) for item in value)
     if value is None or isinstance(value, Vocab):
         return {"1": "true", "": "false", None: "[null]"}.get(value, f"[{value}]")
     if isinstance(value, bytes):
