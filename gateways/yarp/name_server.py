@@ -20,7 +20,7 @@ REQUESTS: Final = "register NAME [CARRIER HOST NUMBER], unregister NAME, query N
 async def name_server(names: NameClient) -> NameServer | None:
     """Start a name server unless one answers; raises Refused."""
     with suppress(Failed):
-        await names.ask("query /root")
+        await names.request("query /root")
         return None
     server = NameServer(names)
     await server.open(names.number)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import struct
 from asyncio import StreamReader, StreamWriter
 from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
@@ -15,8 +16,13 @@ from contextlib import suppress
 from typing import Any, Final, TypeVar
 
 from foosim.common.errors import Failed, Malformed, Refused
-from foosim.common.limits import YARP_BEHIND_BYTES_MAX, YARP_BEHIND_MESSAGES_MAX, YARP_LINE_BYTES_MAX
-from foosim.gateways.yarp.wire import Vocab, encode, magic, message, read_message, to_text
+from foosim.common.limits import (
+    YARP_BEHIND_BYTES_MAX,
+    YARP_BEHIND_MESSAGES_MAX,
+    YARP_LINE_BYTES_MAX,
+    YARP_MESSAGE_BYTES_MAX,
+)
+from foosim.gateways.yarp.wire import Vocab, decode, encode, from_text, magic, message, to_text
 
 CARRIERS: Final = {"tcp": magic(0x1EE4), "fast_tcp": magic(0x1E64), "text": b"CONNECT ", "text_ack": b"CONNACK "}
 """The first eight bytes of a connection."""
@@ -42,18 +48,36 @@ async def attempt(what: str, work: Awaitable[T]) -> T:
         raise Failed(f"{what}: {str(error) or type(error).__name__}") from None
 
 
+async def read_message(stream: StreamReader, text: bool = False) -> tuple[str, list[Any]]:
+    """Return the command of the next message and its bottle; raises Malformed, IncompleteReadError."""
+    if text:
+        command = (await stream.readuntil()).decode(errors="replace").strip()
+        return command, from_text((await stream.readuntil()).decode()) if command[:1] in ("d", "D", "a") else []
+    head = await stream.readexactly(18)
+    if head[:8] != magic(10):
+        raise Malformed(f"{head[:8]!r}, where a message starts with {magic(10)!r}")
+    sizes = struct.unpack(f"<{head[8] + head[9]}i", await stream.readexactly(4 * (head[8] + head[9])))
+    if min(sizes, default=0) < 0 or not 8 <= sum(sizes) <= YARP_MESSAGE_BYTES_MAX:
+        raise Malformed(f"a message with blocks of {sizes} bytes; 8 to {YARP_MESSAGE_BYTES_MAX} in all are valid")
+    data = await stream.readexactly(sum(sizes))
+    word, _, body = (data[5:6], b"", data[8:]) if data[5] else data[8:].partition(b"\0")
+    if data[4:5] != b"~":
+        raise Malformed(f"a message without a command, {data[:8]!r}")
+    return word.decode(errors="replace"), decode(body) if word[:1] in (b"d", b"D", b"a") else []
+
+
 class NameClient:
     """Asks the name server at an address."""
 
     def __init__(self, host: str, number: int) -> None:
         self.host, self.number = host, number
 
-    async def ask(self, request: str) -> list[str]:
+    async def request(self, line: str) -> list[str]:
         """Return the words of the answer; raises Failed."""
         what = f"name server of YARP at {self.host}:{self.number}"
         stream, writer = await attempt(what, asyncio.open_connection(self.host, self.number))
         try:
-            writer.write(f"NAME_SERVER {request}\n".encode())
+            writer.write(f"NAME_SERVER {line}\n".encode())
             return (await attempt(what, stream.readuntil(END.encode()))).decode(errors="replace").split()[:-4]
         finally:
             writer.close()
@@ -103,7 +127,7 @@ class Port:
             raise Refused(f"port {self.name} cannot listen on {self.host}:{number}: {error.strerror}") from None
         self.number = self._server.sockets[0].getsockname()[1]
         try:
-            await self.names.ask(f"register {self.name} tcp {self.host} {self.number}")
+            await self.names.request(f"register {self.name} tcp {self.host} {self.number}")
         except Failed:
             self._server.close()
             raise
@@ -114,7 +138,7 @@ class Port:
         for target in (*self.links, *self.sources.values()):
             self.disconnect(target)
         with suppress(Failed):
-            await self.names.ask(f"unregister {self.name}")
+            await self.names.request(f"unregister {self.name}")
 
     def write(self, values: Sequence[Any]) -> None:
         """Send a bottle to all readers."""
@@ -130,7 +154,7 @@ class Port:
         carrier = carrier or "tcp"
         if carrier not in CARRIERS:
             raise Refused(f"Cannot connect to {place}: no carrier {carrier} (there are: {', '.join(CARRIERS)})")
-        match await self.names.ask(f"query {target}"):
+        match await self.names.request(f"query {target}"):
             case [_, _, _, _, host, _, number, _, _]:
                 stream, writer = await attempt(place, asyncio.open_connection(host, int(number)))
             case _:

@@ -1,4 +1,4 @@
-"""YARP's wire: bottles as bytes and as text, messages, images. `ports` has the connections.
+"""YARP's wire: bottles as bytes and as text, messages, images. Pure; `ports` has the connections.
 
 A bottle is a list. Its items are int (32 bits, 64 where it needs them), float (64 bits), str, `Vocab`, bytes, and lists
 of these; None is the vocab `null`. Integers are little-endian. Measured against YARP 3.5.
@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import re
 import struct
-from asyncio import StreamReader
 from collections.abc import Sequence
 from typing import Any, Final
 
 from foosim.common.errors import Malformed, show
-from foosim.common.limits import YARP_DEPTH_MAX, YARP_MESSAGE_BYTES_MAX
+from foosim.common.limits import YARP_DEPTH_MAX
 
 INT32, STRING, VOCAB, FLOAT64, BLOB, INT64, LIST, DICT = 1, 4, 9, 10, 12, 17, 256, 512
 NUMBERS: Final = {INT32: "i", FLOAT64: "d", INT64: "q", 32: "b", 64: "h", 128: "f"}
@@ -167,21 +166,3 @@ def message(command: str, values: Sequence[Any] | None = None, text: bool = Fals
         blocks.append(encode(values))
     sizes = struct.pack(f"<B9s{len(blocks) + 1}i", len(blocks), b"\1" + b"\xff" * 8, *map(len, blocks), 0)
     return b"".join((magic(10), sizes, *blocks))
-
-
-async def read_message(stream: StreamReader, text: bool = False) -> tuple[str, list[Any]]:
-    """Return the command of the next message and its bottle; raises Malformed, IncompleteReadError."""
-    if text:
-        command = (await stream.readuntil()).decode(errors="replace").strip()
-        return command, from_text((await stream.readuntil()).decode()) if command[:1] in ("d", "D", "a") else []
-    head = await stream.readexactly(18)
-    if head[:8] != magic(10):
-        raise Malformed(f"{head[:8]!r}, where a message starts with {magic(10)!r}")
-    sizes = struct.unpack(f"<{head[8] + head[9]}i", await stream.readexactly(4 * (head[8] + head[9])))
-    if min(sizes, default=0) < 0 or not 8 <= sum(sizes) <= YARP_MESSAGE_BYTES_MAX:
-        raise Malformed(f"a message with blocks of {sizes} bytes; 8 to {YARP_MESSAGE_BYTES_MAX} in all are valid")
-    data = await stream.readexactly(sum(sizes))
-    word, _, body = (data[5:6], b"", data[8:]) if data[5] else data[8:].partition(b"\0")
-    if data[4:5] != b"~":
-        raise Malformed(f"a message without a command, {data[:8]!r}")
-    return word.decode(errors="replace"), decode(body) if word[:1] in (b"d", b"D", b"a") else []
