@@ -116,7 +116,7 @@ def lines(component: ComponentType) -> Iterator[str]:
     if about["settings"]:
         yield "  settings"
     for setting in about["settings"]:
-        default = "required" if setting["default"] is None else f"default {setting['default']}"
+        default = {None: "required", "": "optional"}.get(setting["default"], f"default {setting['default']}")
         yield f"    {setting['key']}: {setting['value']} ({default})"
     if component.type_name in VALUES:
         fields = about[VALUES[component.type_name]]

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from foosim.common import names, units
 from foosim.common.errors import ABSENT, CHOICES_MAX, BadValue, Refused, UnknownName, show
-from foosim.common.finding import Finding, Location
+from foosim.common.finding import Finding, Location, path_text
 from foosim.common.keyed_random import draw_key
 from foosim.common.names import NAME_RULE, is_robot_name, nearest_name
 from foosim.common.spec_base import RATE_MIN, SpecBase
@@ -78,6 +78,7 @@ from foosim.world.scenery import SceneryMesh
 
 Said = dict[tuple[str, str], dict[str, list[str]]]
 """By what a player hears, as a text, and a selector: the channels that it subscribes to, each with their endpoints."""
+Labelled = EntitySettings | SensorSettings | ActuatorSettings
 Find = Callable[[Deployment, Names], Iterable[Finding]]
 """Finds problems, lazily. Names are those of the endpoints."""
 
@@ -114,6 +115,26 @@ def _names(deployment: Deployment, ends: Names) -> Iterator[Finding]:
                     yield Finding(location, "a reserved name", at="key")
                 elif channel in others:
                     yield Finding(location, f"a name that is also one of {name}'s actuators", at="key")
+
+
+def _labels(deployment: Deployment, ends: Names) -> Iterator[Finding]:
+    """A label is that of one entity, and of one component of its robot; none has it as its name."""
+    sections = ("robots", deployment.robots), ("objects", deployment.objects)
+    yield from _doubled_labels(
+        {(section, name): its for section, entities in sections for name, its in entities.items()}
+    )
+    for name, robot in deployment.robots.items():
+        parts = ("sensors", robot.sensors), ("actuators", robot.actuators)
+        yield from _doubled_labels(
+            {("robots", name, part, channel): its for part, its_own in parts for channel, its in its_own.items()}
+        )
+
+
+def _doubled_labels(labelled: Mapping[Location, Labelled]) -> Iterator[Finding]:
+    taken = {str(location[-1]): location for location, its in labelled.items() if not its.label}
+    for location, its in labelled.items():
+        if its.label and (other := taken.setdefault(its.label, location)) != location:
+            yield Finding((*location, "label"), f"also the label or the name of {path_text(other)}")
 
 
 def _processes(deployment: Deployment, ends: Names) -> Iterator[Finding]:
@@ -244,6 +265,13 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
     is_written = deadlines.model_fields_set >= {"tick_named_ns", "tick_lost_ns"}
     if is_written and deadlines.tick_named_ns > deadlines.tick_lost_ns:
         yield Finding(("deadlines", "tick_named"), "longer than tick_lost")
+
+
+def _gateways(deployment: Deployment, ends: Names) -> Iterator[Finding]:
+    """Gateways serve what there is, in ways that their kinds know."""
+    if all(robot in deployment.robots for gateway in deployment.gateways.values() for robot in gateway.robots):
+        for name, gateway in deployment.gateways.items():
+            yield from gateway.component_type.factory.check(name, gateway, deployment)
 
 
 # --- times ------------------------------------------------------------------------------------------------------------
@@ -971,12 +999,14 @@ class Check(NamedTuple):
 BETWEEN: Final = (
     Check("kits and what they bring", _kits),
     Check("names", _names),
+    Check("labels", _labels),
     Check("processes", _processes),
     Check("hosts", _hosts),
     Check("owners of robots", _nodes),
     Check("robots of players", _players),
     Check("what players hear", _hears),
     Check("settings that depend on each other", _settings),
+    Check("components of gateways", _gateways),
     Check("scenery", _scenery),
     Check("network", lambda deployment, ends: check_network(deployment.network, ends)),
     Check("times", _times, of_entries=True),

@@ -141,6 +141,7 @@ def test_bounds_are_told_of_as_they_are(told: Telling) -> None:
     out, _ = told("components", "sensor", "bounded")
     assert [line.strip() for line in out.splitlines() if "rate" not in line and "offset" not in line][3:-1] == [
         "modifiers: a list: of modifiers, see components modifier (default [])",
+        "label: 1 to 64 printable characters (optional)",
         "least: number, more than 0, at most 2 (required)",
         "most: integer, at least 1, less than 7 (default 3)",
         "times: a list, each: number, less than 0 (default [])",

@@ -63,6 +63,18 @@ def test_a_partition_that_is_called_for_is_that_of_the_deployment() -> None:
         simulation.heal()
 
 
+def test_labels_change_nothing() -> None:
+    labels = (
+        "robots.red.goal.label=Buts rouges, 1",
+        "robots.red.goal.sensors.encoder.label=encoder.001",
+        "robots.blue.goal.sensors.encoder.label=encoder.001",
+        "robots.red.goal.actuators={position: {kind: rod_position, label: Rod}}",
+    )
+    with Simulation(TABLE, sets=[WAIT]) as plain, Simulation(TABLE, sets=[WAIT, *labels]) as labelled:
+        assert plain.frame.layout.digest == labelled.frame.layout.digest
+        assert digests_of(plain, TICKS) == digests_of(labelled, TICKS)
+
+
 def test_commands_of_an_agent_are_those_of_a_player_who_sends_the_same() -> None:
     """By the network of the deployment: the packets of the agent draw what those of the player draw."""
     sets = [PLAYERS, WAIT, "network.links.0.loss=20 %"]

@@ -2,19 +2,44 @@
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import Field, PrivateAttr, SerializeAsAny, StringConstraints
+from pydantic import AfterValidator, Field, PrivateAttr, SerializeAsAny, StringConstraints
 
 from foosim.common import limits, names
+from foosim.common.errors import BadValue
 from foosim.common.finding import Location
 from foosim.common.spec_base import Name, Offset, Rate, SpecBase, default
+from foosim.common.units import custom_error
 
 MODIFIERS_MAX: Final = 8
 COMPONENTS_MAX: Final = 16
 TAGS_MAX: Final = 16
+LABEL_LENGTH_MAX: Final = 64
+
+
+def _printable(label: str) -> str:
+    if not label.isprintable():
+        raise custom_error(BadValue("not printable characters", label))
+    return label
+
 
 Tag = Annotated[str, StringConstraints(pattern=names.NAME_PATTERN, max_length=limits.NAME_LENGTH_MAX)]
+Label = Annotated[
+    str,
+    StringConstraints(min_length=1, max_length=LABEL_LENGTH_MAX),
+    AfterValidator(_printable),
+    Field(description=f"1 to {LABEL_LENGTH_MAX} printable characters"),
+]
+"""The name for people and for other programs, in place of the name in the deployment; any printable characters."""
+
+RobotSelector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
+"""Robots by name, or by a pattern of names."""
+
+
+def client_on(gateway: str, robot: str) -> str:
+    """Return the name of a gateway's client on board of a robot."""
+    return f"{gateway}-{robot.replace('.', '-')}"
 
 
 class TypedSettings(SpecBase):
@@ -44,11 +69,12 @@ class ModifierSettings(ComponentSettings):
 
 
 class SensorSettings(ComponentSettings):
-    """The settings of each sensor: its rate, and the modifiers of its readings, in order."""
+    """The settings of each sensor: its rate, the modifiers of its readings, in order, and its label."""
 
     rate_hz: Rate = Field(alias="rate")
     offset_ns: Offset = default("0 s", "offset")
     modifiers: list[SerializeAsAny[ModifierSettings]] = Field(default=[], max_length=MODIFIERS_MAX)
+    label: Label = ""
 
     @property
     def carried_bytes(self) -> int | None:
@@ -62,9 +88,10 @@ class SensorSettings(ComponentSettings):
 
 
 class ActuatorSettings(ComponentSettings):
-    """The settings of each actuator: the modifiers of its commands, in order."""
+    """The settings of each actuator: the modifiers of its commands, in order, and its label."""
 
     modifiers: list[SerializeAsAny[ModifierSettings]] = Field(default=[], max_length=MODIFIERS_MAX)
+    label: Label = ""
 
 
 class EntityRuleSettings(ComponentSettings):
@@ -79,15 +106,35 @@ class SceneSettings(ComponentSettings):
     """The settings of each scene."""
 
 
+class GatewaySettings(ComponentSettings):
+    """The settings of each gateway: the robots that it serves, and who starts its process.
+
+    On board of each of these is a client of the run, `NAME-ROBOT`, with dots as dashes, which hears the robot's sensors
+    and commands it; the client `NAME` is on board of none. `classes` chooses the class of a component, `ROBOT.CHANNEL`,
+    where its type has several; `alter` are the frames in which its numbers are given, in order.
+    """
+
+    robots: list[RobotSelector] = Field(default=["*"], max_length=limits.ENTITIES_MAX)
+    launch: Literal["local", "manual"] = "local"
+    classes: dict[str, str] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    alter: dict[str, list[str]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+
+    def clients(self, name: str) -> dict[str, str]:
+        """Return the clients of the gateway with this name by robot; its own one is that of no robot, an empty name."""
+        return {"": name} | {robot: client_on(name, robot) for robot in self.robots}
+
+
 class EntitySettings(TypedSettings):
     """The settings of every entity: its model, a registered name or `module:Class`.
 
     `tags` are found by components and rules, beside the tags of its model. A `spare` is absent until it is added.
+    A `label` is its name at gateways, and changes nothing in the world.
     """
 
     model: str
     spare: bool = False
     tags: list[Tag] = Field(default=[], max_length=TAGS_MAX)
+    label: Label = ""
 
     @property
     def felt_surfaces(self) -> Mapping[Location, str]:
@@ -122,6 +169,7 @@ BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
         "entity_rule": EntityRuleSettings,
         "rule": RuleSettings,
         "scene": SceneSettings,
+        "gateway": GatewaySettings,
         "model": EntitySettings,
     }
 )
