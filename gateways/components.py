@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
-from foosim.gateways.rows import Component, Order, Row, label_of, row_of, services_of
+from foosim.gateways.rows import Component, Order, Row, label_of, services_of
+from foosim.gateways.table import row_of
 from foosim.world.component_types.settings import ComponentSettings, GatewaySettings
 
 RADIO: Final = "radio"

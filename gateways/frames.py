@@ -16,7 +16,7 @@ from math import pi
 from typing import Any, Final
 
 from foosim.common.errors import BadValue, UnknownName
-from foosim.common.exact_math import atan2, hypot, sincos
+from foosim.common.exact_math import asin, atan2, hypot, sincos
 from foosim.world.earth import EarthOrigin, Geodesy, to_ecef, to_geodetic
 
 Fields = dict[str, Any]
@@ -78,6 +78,14 @@ def _alteration(written: str | Mapping[str, Any], morse: str, origin: EarthOrigi
             raise BadValue("in a world without an origin on Earth: add origin: {latitude: ..., longitude: ...}", name)
         return Alteration(names, *_on_earth(name, Geodesy(origin)))
     return Alteration(names, *(OF_ANGLES[name] if names is ANGLES else OF_PLACES[name]))
+
+
+def euler(orientation: tuple[float, float, float, float]) -> Point:
+    """Return yaw, pitch and roll of an orientation (x, y, z, w)."""
+    x, y, z, w = orientation
+    pitch = asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
+    yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return yaw, pitch, atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
 
 
 def _offset(about: object) -> tuple[Change, Change]:

@@ -20,7 +20,7 @@ from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.channel_kinds import channels_of
 from foosim.deployment.schema import Deployment
 from foosim.gateways.components import RADIO, RECEIVED, components_of
-from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, label_of
+from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, label_of, reading
 from foosim.protocol.messages import Received
 from foosim.world.component_types.jobs import JobState
 
@@ -111,13 +111,15 @@ class Run:
 
     def _measured(self, component: Component, packet: Received) -> None:
         codec, _ = self._channels[packet.source, packet.channel]
-        assert codec is not None and component.row.out is not None, "sensors have a codec"
+        assert codec is not None, "sensors have a codec"
         try:
             value = codec.decode(packet.payload)
         except Malformed as malformed:
             self._log.warning("%s: %s", component.full, malformed)
             return
-        self._deliver(component, component.row.out(value, component), packet)
+        fields = reading(component, value, packet.sent_ns)
+        if fields is not None:
+            self._deliver(component, fields, packet)
 
     def _received(self, robot: str, packet: Received) -> None:
         sender = next((robot for robot, client in self.clients.items() if client == packet.source), "")
