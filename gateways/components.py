@@ -6,9 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
+from foosim.gateways.frames import alterations
 from foosim.gateways.rows import Component, Order, Row, label_of, services_of
 from foosim.gateways.table import row_of
-from foosim.world.component_types.settings import ComponentSettings, GatewaySettings
+from foosim.world.component_types.settings import ActuatorSettings, ComponentSettings, GatewaySettings, SensorSettings
 
 RADIO: Final = "radio"
 """The channel of packets between clients on board of robots."""
@@ -33,18 +34,20 @@ def radios(deployment: Deployment, robot: str) -> Iterator[Component]:
 def components_of(deployment: Deployment, settings: GatewaySettings) -> dict[str, Component]:
     """Return the components of the robots that a gateway serves, by their names in the deployment, `ROBOT.CHANNEL`.
 
-    Raises UnknownName for a class that one of them does not have.
+    Raises BadValue for a class that one of them does not have, and frames in which it cannot be given.
     """
     found: dict[str, Component] = {}
     for robot in settings.robots:
         its, label = deployment.robots[robot], label_of(deployment, robot)
         if len(settings.robots) > 1:
             found |= {f"{robot}.{one.channel}": one for one in radios(deployment, robot)}
-        for channel, one in (*its.sensors.items(), *its.actuators.items()):
+        channels: list[tuple[str, SensorSettings | ActuatorSettings]] = [*its.sensors.items(), *its.actuators.items()]
+        for channel, one in channels:
             if one.kind != "job":
-                row = row_of(one, settings.classes.get(f"{robot}.{channel}", ""))
-                name = f"{label}.{one.label or channel}"
-                found[f"{robot}.{channel}"] = Component(name, robot, channel, one, deployment, row)
+                key, name = f"{robot}.{channel}", f"{label}.{one.label or channel}"
+                row = row_of(one, settings.classes.get(key, ""))
+                frames = alterations(settings.alter.get(key, ()), row.morse, deployment.origin)
+                found[key] = Component(name, robot, channel, one, deployment, row, beside=found, alterations=frames)
     return found
 
 

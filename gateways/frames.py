@@ -1,19 +1,19 @@
-"""MORSE's frames of reference on the fields of a component, as its `alter` has them: of what leaves and what comes in.
+"""MORSE's frames of reference on the fields of a component, as its `alter` has them, and Euler angles.
 
-A gateway's `alter` lists them by name; they are applied in that order, to readings as to commands. Those of places
-change `x`, `y` and `z`, those of angles `yaw`, `pitch` and `roll`:
+A gateway's `alter` lists them by name, in the order in which they are applied, to readings as to commands:
 
-    alter: {cat.gps: [UTM, NED], cat.heading: [NED]}
+    alter: {cat.gps: [UTM 1000 2000 0, NED], cat.heading: [NED]}
 
-The deployment's `origin` is the place of its world on Earth, and says where north is.
+Those of places change `x`, `y` and `z`; UTM adds offsets (m). The deployment's `origin` is the place of its world on
+Earth, and says where north is. NED changes `yaw`, `pitch` and `roll` of a Gyroscope; `NED_legacy` exchanges yaw and
+roll, as MORSE does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from math import pi
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.exact_math import asin, atan2, hypot, sincos
@@ -25,59 +25,49 @@ Change = Callable[[Point], Point]
 DEGREES: Final = 180.0 / pi
 FEET: Final = 3.2808399
 """MORSE's feet in a metre."""
-PLACES: Final = ("x", "y", "z")
-ANGLES: Final = ("yaw", "pitch", "roll")
 PLACED: Final = ("Pose", "GPS", "Destination", "Waypoint", "Teleport", "RotorcraftWaypoint")
-TURNED: Final = ("Gyroscope", "Orientation")
-OFFSETS: Final = frozenset(PLACES)
+TURNED: Final = ("Gyroscope",)
 
 
-@dataclass(frozen=True, slots=True)
-class Alteration:
+class Alteration(NamedTuple):
     """A change of three fields, and its inverse."""
 
     names: tuple[str, str, str]
     leaving: Change
     coming: Change
 
-    def out(self, fields: Fields) -> Fields:
-        """Return the fields of a reading, changed."""
-        return self._changed(fields, self.leaving)
-
-    def into(self, fields: Fields) -> Fields:
-        """Return the fields of a command in the world's frame."""
-        return self._changed(fields, self.coming)
-
-    def _changed(self, fields: Fields, change: Change) -> Fields:
+    def apply(self, fields: Fields, change: Change) -> Fields:
+        """Return fields with the three changed."""
         a, b, c = (float(fields[name]) for name in self.names)
-        return {**fields, **dict(zip(self.names, change((a, b, c)), strict=True))}
+        return fields | dict(zip(self.names, change((a, b, c)), strict=True))
 
 
-def alterations(written: Sequence[str | Mapping[str, Any]], morse: str, origin: EarthOrigin | None) -> list[Alteration]:
-    """Return those of a component of a class of MORSE. Raises BadValue, with the valid choices.
-
-    `{UTM: {x: 1000, y: 2000, z: 0}}` has the offsets (m) that it adds.
-    """
+def alterations(written: Sequence[str], morse: str, origin: EarthOrigin | None) -> list[Alteration]:
+    """Return those of a component of a class of MORSE. Raises BadValue, with the valid choices."""
     return [_alteration(one, morse, origin) for one in written]
 
 
-def _alteration(written: str | Mapping[str, Any], morse: str, origin: EarthOrigin | None) -> Alteration:
-    name, about = (written, None) if isinstance(written, str) else next(iter(written.items()), ("", None))
-    if name not in NAMES:
-        raise UnknownName("unknown frame", name, NAMES)
-    names, classes = (ANGLES, TURNED) if morse in TURNED and name in OF_ANGLES else (PLACES, PLACED)
-    if morse not in classes:
-        valid = (*PLACED, *(TURNED if name in OF_ANGLES else ()))
-        raise BadValue(f"{name} is for components of the classes {', '.join(valid)}", morse)
+def _alteration(written: str, morse: str, origin: EarthOrigin | None) -> Alteration:
+    name, *offsets = written.split()
+    if name not in (*OF_PLACES, *ON_EARTH, "UTM"):
+        raise UnknownName("unknown frame", name, (*OF_PLACES, *ON_EARTH, "UTM"))
+    if morse not in (*PLACED, *(TURNED if name in OF_ANGLES else ())):
+        raise BadValue(f"{name} is for {', '.join(PLACED)}, and NED for {', '.join(TURNED)}; not for the class", morse)
+    if len(offsets) != (3 if name == "UTM" else 0):
+        raise BadValue("UTM has three offsets in m, as UTM 1000 2000 0, others have none", written)
+    if morse in TURNED:
+        return Alteration(("yaw", "pitch", "roll"), *OF_ANGLES[name])
     if name == "UTM":
-        return Alteration(names, *_offset(about))
-    if about is not None:
-        raise BadValue(f"{name} has no settings", about)
-    if name in ON_EARTH:
-        if origin is None:
-            raise BadValue("in a world without an origin on Earth: add origin: {latitude: ..., longitude: ...}", name)
-        return Alteration(names, *_on_earth(name, Geodesy(origin)))
-    return Alteration(names, *(OF_ANGLES[name] if names is ANGLES else OF_PLACES[name]))
+        x, y, z = map(float, offsets)
+        return Alteration(
+            ("x", "y", "z"), lambda p: (p[0] + x, p[1] + y, p[2] + z), lambda p: (p[0] - x, p[1] - y, p[2] - z)
+        )
+    if name in OF_PLACES:
+        return Alteration(("x", "y", "z"), *OF_PLACES[name])
+    if origin is None:
+        raise BadValue("in a world without an origin on Earth: add origin: {latitude: ..., longitude: ...}", name)
+    (leaving, coming), geodesy = ON_EARTH[name], Geodesy(origin)
+    return Alteration(("x", "y", "z"), lambda p: leaving(geodesy.geodetic(p)), lambda p: geodesy.place(coming(p)))
 
 
 def euler(orientation: tuple[float, float, float, float]) -> Point:
@@ -86,27 +76,6 @@ def euler(orientation: tuple[float, float, float, float]) -> Point:
     pitch = asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
     yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     return yaw, pitch, atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-
-
-def _offset(about: object) -> tuple[Change, Change]:
-    if not isinstance(about, Mapping) or not OFFSETS.issuperset(about):
-        raise BadValue("UTM needs its offsets in m: {UTM: {x: 1000, y: 2000, z: 0}}", about)
-    x, y, z = (float(about.get(name, 0.0)) for name in PLACES)
-    return (lambda p: (p[0] + x, p[1] + y, p[2] + z)), (lambda p: (p[0] - x, p[1] - y, p[2] - z))
-
-
-def _on_earth(name: str, geodesy: Geodesy) -> tuple[Change, Change]:
-    """Return the changes from places of the world, through latitude, longitude (rad) and altitude (m)."""
-    leaving, coming = ON_EARTH[name]
-    return (lambda place: leaving(geodesy.geodetic(place))), (lambda place: geodesy.place(coming(place)))
-
-
-def _in_degrees(place: Point) -> Point:
-    return place[1] * DEGREES, place[0] * DEGREES, place[2]
-
-
-def _from_degrees(place: Point) -> Point:
-    return place[1] / DEGREES, place[0] / DEGREES, place[2]
 
 
 def _to_geocentric(place: Point) -> Point:
@@ -124,24 +93,26 @@ def _ned(place: Point) -> Point:
     return place[1], place[0], -place[2]
 
 
+def _ned_angles(angles: Point) -> Point:
+    return pi / 2.0 - angles[0], -angles[1], angles[2]
+
+
 Both = tuple[Change, Change]
 ON_EARTH: Final[dict[str, Both]] = {
     "ECEF": (to_ecef, to_geodetic),
-    "geodetic": (_in_degrees, _from_degrees),
+    "geodetic": (
+        lambda p: (p[1] * DEGREES, p[0] * DEGREES, p[2]),
+        lambda p: (p[1] / DEGREES, p[0] / DEGREES, p[2]),
+    ),
     "geocentric": (_to_geocentric, _from_geocentric),
 }
-"""Longitude and latitude are in degrees, in this order."""
+"""From latitude, longitude (rad) and altitude (m), and back; longitude and latitude in degrees, in this order."""
 OF_PLACES: Final[dict[str, Both]] = {
     "NED": (_ned, _ned),
     "NED_legacy": (_ned, _ned),
-    "feet": (
-        lambda p: (p[0] * FEET, p[1] * FEET, p[2] * FEET),
-        lambda p: (p[0] / FEET, p[1] / FEET, p[2] / FEET),
-    ),
+    "feet": (lambda p: (p[0] * FEET, p[1] * FEET, p[2] * FEET), lambda p: (p[0] / FEET, p[1] / FEET, p[2] / FEET)),
 }
 OF_ANGLES: Final[dict[str, Both]] = {
-    "NED": (lambda p: (pi / 2 - p[0], -p[1], p[2]), lambda p: (pi / 2 - p[0], -p[1], p[2])),
-    "NED_legacy": (lambda p: (p[2], -p[1], pi / 2 - p[0]), lambda p: (pi / 2 - p[2], -p[1], p[0])),
+    "NED": (_ned_angles, _ned_angles),
+    "NED_legacy": (lambda p: (p[2], -p[1], pi / 2.0 - p[0]), lambda p: (pi / 2.0 - p[2], -p[1], p[0])),
 }
-"""Of yaw, pitch and roll. MORSE exchanges roll and yaw, as `NED_legacy` does."""
-NAMES: Final = ("UTM", *ON_EARTH, *OF_PLACES)

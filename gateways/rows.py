@@ -100,8 +100,8 @@ class Component:
     """How many readings have come, or commands were sent."""
     alterations: Sequence[Alteration] = ()
     """The frames of reference in which its fields are given."""
-    beside: dict[str, Component] = field(default_factory=dict)
-    """The components of its robot by channel."""
+    beside: Mapping[str, Component] = field(default_factory=dict)
+    """The components of the gateway by `ROBOT.CHANNEL`."""
     status: str = "Stop"
     """Of an actuator with jobs: `Transit` while one runs, `Arrived` when it is done, else `Stop`."""
 
@@ -123,7 +123,7 @@ def reading(component: Component, value: Any, time_ns: int) -> Fields | None:
         return None
     fields = {name: fields[name] for name in component.row.fields}
     for one in component.alterations:
-        fields = one.out(fields)
+        fields = one.apply(fields, one.leaving)
     return fields
 
 
@@ -145,7 +145,7 @@ def command(component: Component, given: Mapping[str, Any], numbers: Fields | No
     try:
         fields = whole
         for one in component.alterations:
-            fields = one.into(fields)
+            fields = one.apply(fields, one.coming)
         return whole, row.into(fields, component)
     except (TypeError, ValueError, LookupError, AttributeError) as error:
         raise Refused(f"{component.full} takes {', '.join(row.fields)} as numbers: {error}") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from base64 import b64encode
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from math import inf, pi, tan
@@ -266,7 +266,7 @@ def rotate_robot(component: Component, roll: float, pitch: float = 0.0, yaw: flo
 def _joints_now(component: Component) -> dict[str, float]:
     """Return the positions of joints, by the joint sensor beside an actuator."""
     for one in component.beside.values():
-        if one.row.kind == "joint_state" and one.fields is not None:
+        if one.robot == component.robot and one.settings.kind == "joint_state" and one.fields is not None:
             return one.fields
     raise Refused(f"{component.full}: its robot needs a sensor joint_state, with its joints by name, that has measured")
 
