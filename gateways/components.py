@@ -41,8 +41,8 @@ def components_of(deployment: Deployment, settings: GatewaySettings) -> dict[str
         its, label = deployment.robots[robot], label_of(deployment, robot)
         if len(settings.robots) > 1:
             found |= {f"{robot}.{one.channel}": one for one in radios(deployment, robot)}
-        channels: list[tuple[str, SensorSettings | ActuatorSettings]] = [*its.sensors.items(), *its.actuators.items()]
-        for channel, one in channels:
+        parts: dict[str, SensorSettings | ActuatorSettings] = {**its.sensors, **its.actuators}
+        for channel, one in parts.items():
             if one.kind != "job":
                 key, name = f"{robot}.{channel}", f"{label}.{one.label or channel}"
                 row = row_of(one, settings.classes.get(key, ""))
