@@ -145,8 +145,8 @@ def uses_of(deployment: Deployment) -> list[SharedSettings]:
     known: dict[tuple[object, ...], Profile] = {}
     """By what decides the profile of a pair: there may be a million pairs."""
     pairs = ((source, destination) for source in endpoints for destination in endpoints if source != destination)
-    for pair, rule in ((pair, rule) for pair in pairs for rule in profiles.rules_for(*pair)):
-        source, destination = pair
+    for source, destination, rule in ((*pair, rule) for pair in pairs for rule in profiles.rules_for(*pair)):
+        pair = source, destination
         is_on_board = profiles.body(source) == profiles.body(destination)
         deciding = rule and rule.id, alike[source], alike[destination], is_on_board
         profile = known.get(deciding)
