@@ -77,7 +77,7 @@ class Client(Connection[Tclserv]):
         if not self._number and command == "HELLO":
             self._number = str(next(self._gateway.numbers))
             self._gateway.clients[self._number] = self
-            self._tell(f"HELLO {self._number}")
+            self._write(f"HELLO {self._number}")
         elif command == "BYE":
             self.transport.close()
         elif not self._number:
@@ -85,9 +85,9 @@ class Client(Connection[Tclserv]):
             self.transport.close()
         else:
             try:
-                self._request(*words) if command == "RQST" else self._tell(f"OK {self._answer(command, words)}")
+                self._request(*words) if command == "RQST" else self._write(f"OK {self._answer(command, words)}")
             except Refused as refused:
-                self._tell(f"ERROR {refused}")
+                self._write(f"ERROR {refused}")
 
     def _answer(self, command: str, words: Sequence[str]) -> str:
         server = self._gateway
@@ -133,14 +133,14 @@ class Client(Connection[Tclserv]):
                 self._gateway.running[number] = result
             else:
                 end = _result(result)
-        self._tell(f"OK {number}")
+        self._write(f"OK {number}")
         self._notify(f"{event} TERM {end}" if end else f"{event} ACK 0")
 
     def _notify(self, event: str) -> None:
-        """Tell the program that gets the events."""
-        (self if self._events.transport.is_closing() else self._events)._tell(event)
+        """Write to the program that gets the events."""
+        (self if self._events.transport.is_closing() else self._events)._write(event)
 
-    def _tell(self, text: str) -> None:
+    def _write(self, text: str) -> None:
         self.answer(f"{text}\r\n".encode())
 
 

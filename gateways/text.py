@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import hypot, nan
+from os import SEEK_END
 from pathlib import Path
 from typing import Annotated, BinaryIO, Final
 
@@ -64,8 +65,8 @@ class Text(Gateway):
         fields = (robot.fields if robot is not None else None) or {}
         pose = [fields.get(name, nan) for name in POSE]
         try:
-            file.write(("" if file.tell() else header_of(component, pose)).encode())
-            file.write(record_of(component, pose).encode())
+            is_new = component.count == 1 and not file.seek(0, SEEK_END)
+            file.write(((header_of(component, pose) if is_new else "") + record_of(component, pose)).encode())
         except OSError as error:
             self._end(component.full, error)
 
