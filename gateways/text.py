@@ -19,7 +19,8 @@ from pydantic import Field
 
 from foosim.common.errors import Refused
 from foosim.gateways.gateway import Gateway, Peer
-from foosim.gateways.rows import POSE, Component, label_of
+from foosim.gateways.rows import Component, label_of
+from foosim.gateways.table import POSE
 from foosim.world.component_types.registry import gateway
 from foosim.world.component_types.settings import GatewaySettings
 from foosim.world.scene import from_rpy, rotate
