@@ -13,7 +13,13 @@ class RoleVerbs(Verbs):
     """The processes of a run, other than `foosim run`, the supervisor alone."""
 
     table: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "Commands": {"node": "node.main", "vhub": "vhub.main", "player": "client.main", "roles": "cli.roles"}
+        "Commands": {
+            "node": "node.main",
+            "vhub": "vhub.main",
+            "player": "client.main",
+            "gateway": "gateways.main",
+            "roles": "cli.roles",
+        }
     }
 
 

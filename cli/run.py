@@ -92,14 +92,14 @@ def run_roles(  # noqa: PLR0913  # what the command was given
 
         def add_players(session: Session | None) -> None:
             """Add the players: on the vHub's session, else on one of theirs, or with certificates on one each."""
-            from foosim.client.main import PlayerShell
+            from foosim.client.main import ClientShell
 
             credentials = None
             for player in players:
                 if session is None or credentials is not None:  # a session has one certificate
                     link = client_session(radio, f"client.{player}", pki, stop, Plane.RADIO)
                     session, credentials = opened.enter_context(link)
-                process.add(PlayerShell(process, player, session, credentials=credentials))
+                process.add(ClientShell(process, player, session, credentials=credentials))
 
         shell, simulation, credentials = None, None, None
         here = ([VHUB] if vhub is not None else []) + [f"node.{node}" for node in nodes]

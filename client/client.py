@@ -11,6 +11,9 @@ The name is one that the deployment declares under `clients`. In `lockstep` the 
 until the loop's body is done; after `listen` it continues by itself. Everything travels as packets through the emulated
 network: packets arrive late, and some are lost. Lengths are in m, angles in rad, times in simulated ns, in the world's
 frame (origin on the floor in the middle, z up). A client belongs to one thread.
+
+Programs with an event loop of their own do not wait in `receive`: with `connect(..., notify=callback)` they call
+`receive(0.0)` after a callback and at `deadline_s()` (docs/how-to/write_a_player.md).
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
@@ -221,7 +225,7 @@ class Robot:
 class Link:
     """The client's connection to the vHub: its core on a session, driven by the thread that waits."""
 
-    def __init__(self, core: ClientCore, session: Session) -> None:
+    def __init__(self, core: ClientCore, session: Session, notify: Callable[[], None] | None = None) -> None:
         from foosim.runtime.roles.loop import Loop
         from foosim.runtime.roles.role import Role
         from foosim.runtime.roles.wire import Wire
@@ -230,7 +234,7 @@ class Link:
         self.locator: Final = session.locator
         self.closed = False
         self._session = session
-        self._inbox = Inbox(limits.INBOX_MESSAGES_MAX)
+        self._inbox = Inbox(limits.INBOX_MESSAGES_MAX, notify)
         self._until_ns = NEVER_NS
         self.wire = Wire(session, Plane.RADIO, self._inbox, core.name)
         self._role = Role(core.name, core, _LOG, lambda now_ns: max(now_ns, min(core.deadline_ns(), self._until_ns)))
@@ -255,9 +259,8 @@ class Link:
         self._until_ns = NEVER_NS
         if timeout_s is not None:
             self._until_ns = time.monotonic_ns() + int(max(timeout_s, 0.0) * NS_PER_S)
-        self._inbox.wake()  # the first round does not sleep: it learns until when it may
+        self._loop.go_round(sleeps=False)  # it learns until when the next one may sleep
         while True:
-            self._loop.go_round()
             if reached():
                 return
             if self.core.refusal and self.core.deployment is not None:
@@ -266,6 +269,7 @@ class Link:
                 raise ConnectionFailed(f"lost the vHub at {self.locator}")
             if time.monotonic_ns() >= self._until_ns:
                 return
+            self._loop.go_round()
 
     def close(self) -> None:
         """Close the session."""
@@ -409,6 +413,13 @@ class Client(Closable):
         self._take(core.arrivals)
         core.arrivals.clear()
         return self.packets
+
+    def deadline_s(self) -> float:
+        """When `receive` has something to do next without a message, by `time.monotonic`; infinite for never."""
+        due_ns = self._core.deadline_ns()
+        due_s = inf if due_ns == NEVER_NS else due_ns / NS_PER_S
+        is_waiting = any(jobs.job is not None and not jobs.job.state.has_ended for jobs in self._jobs.values())
+        return min(due_s, time.monotonic() + AGAIN_S) if is_waiting else due_s
 
     # --- the end -----------------------------------------------------------------------------------------------------
 
@@ -573,12 +584,15 @@ def connect(
     world: str = "",
     timeout_s: float = CONNECT_S,
     pki: str | os.PathLike[str] | None = None,
+    notify: Callable[[], None] | None = None,
 ) -> Client:
     """Connect to a run as the declared client `name`.
 
     `address` is `run:newest` or `run:NAME` for a run of this user on this machine, else that of the vHub's radio plane,
     `tcp/HOST:PORT`. `world` refuses any other world than this one. With certificates the address is `tls/HOST:PORT`,
-    and `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key.
+    and `pki` the folder with the root ca.pem and the client's own client.NAME.pem and client.NAME.key. `notify` is
+    called, in another thread, when something has come for `receive`, and not again before that is called; it returns at
+    once, as `loop.call_soon_threadsafe` does, since other messages wait for it.
 
     Raises BadValue for an invalid name or address, CertificateError for a folder without valid certificates, NoRun
     without such a live run, ConnectionFailed without an answer within `timeout_s` (wall time), NotAuthorised and
@@ -602,7 +616,7 @@ def connect(
         raise ConnectionFailed(error.what) from None
     try:
         core = ClientCore(name, new_boot(), time.monotonic_ns(), world, FileCache())
-        link = Link(core, session)
+        link = Link(core, session, notify)
         left_s = timeout_s - (time.monotonic_ns() - begun_ns) / NS_PER_S
         link.wait(lambda: core.deployment is not None or bool(core.refusal), left_s)
         if core.refusal:

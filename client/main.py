@@ -7,10 +7,10 @@ presence. Players share the process's loop, and its session where there are no c
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, Protocol
 
 import typer
 
@@ -32,14 +32,31 @@ from foosim.runtime.transport.certificates import Credentials
 from foosim.runtime.transport.session import Session
 
 
-class PlayerShell:
-    """One player, until the run ends, the vHub is gone for good, the player fails, or `stop`."""
+class Driver(Protocol):
+    """What acts for a client: a player, or a gateway."""
+
+    def step(self, now_ns: int) -> None:
+        """Advance after every message and wake. Raises PlayerError for a player that fails."""
+
+    def deadline_ns(self) -> int:
+        """When it acts next without a message."""
+
+
+class ClientShell:
+    """One client, until the run ends, the vHub is gone for good, its player fails, or `stop`."""
 
     def __init__(
-        self, process: Process, name: str, session: Session, world: str = "", credentials: Credentials | None = None
+        self,
+        process: Process,
+        name: str,
+        session: Session,
+        world: str = "",
+        credentials: Credentials | None = None,
+        driver: Callable[[ClientCore], Driver] | None = None,
     ) -> None:
+        """`driver` acts for the client; by default the player of its name."""
         self.core = ClientCore(name, new_boot(), time.monotonic_ns(), world, FileCache())
-        self._player = PlayerLoop(self.core, load_player)
+        self._driver = PlayerLoop(self.core, load_player) if driver is None else driver(self.core)
         self._failure: PlayerError | None = None
         self._is_present = self._is_stopped = False
         self._shell = RoleShell(process, name, self.core, lambda now_ns: self._deadline_ns(), credentials)
@@ -80,18 +97,37 @@ class PlayerShell:
             self._wire.declare_alive()
         if self._failure is None:
             try:
-                self._player.step(now_ns)
+                self._driver.step(now_ns)
             except PlayerError as error:
                 report_failure(self.core, error)
                 self._failure = error
 
     def _deadline_ns(self) -> int:
-        return min(self.core.deadline_ns(), self._player.deadline_ns())
+        return min(self.core.deadline_ns(), self._driver.deadline_ns())
 
     def _on_alive(self, plane: Plane, name: str, is_alive: bool) -> None:
         self._shell.on_alive(name, is_alive)
         if name == VHUB:
             (self.core.hub_here if is_alive else self.core.hub_gone)(time.monotonic_ns())
+
+
+class Sessions:
+    """The sessions of the clients of a process: one for all, with certificates one each, because these have a name."""
+
+    def __init__(self, stack: ExitStack, connect: str, pki: Path | None, stop: Stop) -> None:
+        """They are closed with the `stack`."""
+        self._stack, self._connect, self._pki, self._stop = stack, connect, pki, stop
+        self._newest: tuple[Session, Credentials | None] | None = None
+
+    def of(self, name: str) -> tuple[Session, Credentials | None]:
+        """Return the session of a client. Raises Refused when no vHub can be reached."""
+        if self._newest is None or self._pki is not None:
+            is_first = self._newest is None
+            link = client_session(
+                self._connect, f"client.{name}", self._pki, self._stop, Plane.RADIO, sets_runtime=is_first
+            )
+            self._newest = self._stack.enter_context(link)
+        return self._newest
 
 
 def run_players(
@@ -110,14 +146,10 @@ def run_players(
     log = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} others"
     process = Process(log, progress, is_shared=len(names) > 1)
     with ExitStack() as stack:
-        links: list[tuple[Session, Credentials | None]] = []
+        sessions = Sessions(stack, connect, pki, stop)
         for name in names:
-            if pki is not None or not links:  # a session has one certificate
-                who = f"client.{name}"
-                link = client_session(connect, who, pki, stop, Plane.RADIO, sets_runtime=not links)
-                links.append(stack.enter_context(link))
-            session, credentials = links[-1]
-            process.add(PlayerShell(process, name, session, world, credentials))
+            session, credentials = sessions.of(name)
+            process.add(ClientShell(process, name, session, world, credentials))
         stop.then(process.stop)
         return run_to_end(process)
 

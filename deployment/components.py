@@ -47,8 +47,11 @@ def read_components(data: Any, known: Collection[str]) -> tuple[Any, list[Findin
     for section in (ROBOTS, "objects"):
         if isinstance(data.get(section), dict):
             read[section] = {name: reader.entity((section, name), one) for name, one in data[section].items()}
-    if isinstance(data.get("rules"), dict):
-        read["rules"] = {name: reader.component("rule", ("rules", name), one) for name, one in data["rules"].items()}
+    for section, type_name in (("rules", "rule"), ("gateways", "gateway")):
+        if isinstance(data.get(section), dict):
+            read[section] = {
+                name: reader.component(type_name, (section, name), one) for name, one in data[section].items()
+            }
     if isinstance(data.get("scene"), dict):
         read["scene"] = reader.component("scene", ("scene",), data["scene"])
     return read, reader.findings

@@ -38,7 +38,7 @@ from foosim.deployment.text.yaml import (
 ENTRIES_SHOWN_MAX: Final = 8
 SETS_MAX: Final = 256
 SET_LENGTH_MAX: Final = 4096
-NAMED: Final = {TEMPLATES, *ENTRIES, *SECTIONS, "nodes", "hosts", "radios", "places", "surfaces"}
+NAMED: Final = {TEMPLATES, *ENTRIES, *SECTIONS, "nodes", "gateways", "hosts", "radios", "places", "surfaces"}
 """The sections whose keys are names."""
 
 _STEP = re.compile(r'(?:"(?P<quoted>[^"]*)"|(?P<plain>[^".=\[\]]+))')

@@ -1,6 +1,7 @@
-"""The processes of a run: which roles share one. Roles are the supervisor, the vHub, nodes and players.
+"""The processes of a run: which roles share one. Roles are the supervisor, the vHub, nodes, players and gateways.
 
-Nothing here changes the world. Roles of one process exchange messages in memory, and end together.
+Nothing here changes the world. Roles of one process exchange messages in memory, and end together. A gateway has a
+process of its own.
 """
 
 from __future__ import annotations
@@ -48,11 +49,12 @@ def processes_of(deployment: Deployment, shape: Shape = "deployed") -> dict[str,
     in each shape.
     """
     hosts, roles = places(deployment), [VHUB, SUPERVISOR, *sorted(deployment.nodes), *sorted(deployment.players)]
+    roles += sorted(deployment.gateways)
     declared = deployment.declared_processes()
     fleets = {*declared.values()} - {name for role, name in declared.items() if role not in deployment.players}
     groups: dict[str, list[str]] = {}
     for role in roles:
-        is_ours = deployment.launch_of(role) == "local"
+        is_ours = deployment.launch_of(role) == "local" and role not in deployment.gateways
         if shape == "one" and is_ours:
             name = f"{ONE}-{hosts[role]}" if role in hosts else ONE
             if role in deployment.players and role not in hosts and VHUB in hosts:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, JsonValue, StringConstraints, model_validator
+from pydantic import BeforeValidator, Field, JsonValue, SerializeAsAny, StringConstraints, model_validator
 
 from foosim.common import limits, names, units
 from foosim.common.addresses import LOOPBACK
@@ -24,6 +24,7 @@ from foosim.deployment.network.rules import Network, Selector
 from foosim.deployment.network.traces import check_files, network_files
 from foosim.world.assembly.joint_selection import with_joint_names
 from foosim.world.bodies.visual_meshes import undrawn_path
+from foosim.world.component_types.settings import GatewaySettings
 from foosim.world.scenery import mesh_files, read_contents
 from foosim.world.spec import WorldSpec
 
@@ -181,6 +182,7 @@ class Deployment(WorldSpec):
     vhub: VHubSpec = Field(default_factory=VHubSpec)
     players: dict[Name, Player] = Field(default={}, max_length=limits.CLIENTS_MAX)
     clients: dict[Name, ClientSpec] = Field(default={}, max_length=limits.CLIENTS_MAX)
+    gateways: dict[Name, SerializeAsAny[GatewaySettings]] = Field(default={}, max_length=limits.NODES_MAX)
     network: Network = Field(default_factory=Network)
     capture: Capture = Field(default_factory=Capture)
     access: AccessSpec = Field(default_factory=AccessSpec)
@@ -244,6 +246,8 @@ class Deployment(WorldSpec):
         """The launch of the process of a role."""
         if role in self.nodes:
             return self.nodes[role].launch
+        if role in self.gateways:
+            return self.gateways[role].launch
         return self.players[role].launch if role in self.players else "local"
 
     def declared_processes(self) -> dict[str, str]:

@@ -267,6 +267,13 @@ def _settings(deployment: Deployment, ends: Names) -> Iterator[Finding]:
         yield Finding(("deadlines", "tick_named"), "longer than tick_lost")
 
 
+def _gateways(deployment: Deployment, ends: Names) -> Iterator[Finding]:
+    """Gateways serve what there is, in ways that their kinds know."""
+    if all(robot in deployment.robots for gateway in deployment.gateways.values() for robot in gateway.robots):
+        for name, gateway in deployment.gateways.items():
+            yield from gateway.component_type.factory.check(name, gateway, deployment)
+
+
 # --- times ------------------------------------------------------------------------------------------------------------
 
 
@@ -999,6 +1006,7 @@ BETWEEN: Final = (
     Check("robots of players", _players),
     Check("what players hear", _hears),
     Check("settings that depend on each other", _settings),
+    Check("components of gateways", _gateways),
     Check("scenery", _scenery),
     Check("network", lambda deployment, ends: check_network(deployment.network, ends)),
     Check("times", _times, of_entries=True),

@@ -14,6 +14,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from typing import Any, Final
 
 import msgspec
@@ -23,7 +24,7 @@ from foosim.common.exact_math import asin, atan2
 from foosim.deployment.schema import Deployment
 from foosim.world.component_types.payloads import as_float
 from foosim.world.component_types.per_field import codec_of
-from foosim.world.component_types.settings import ActuatorSettings, SensorSettings
+from foosim.world.component_types.settings import ComponentSettings, SensorSettings
 from foosim.world.scene import Quaternion, multiply
 
 MANAGER: Final = "Socket service manager"
@@ -74,7 +75,7 @@ class Row:
     """Fields that a first command may be without."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Component:
     """A sensor or an actuator of a run, by MORSE's names."""
 
@@ -82,13 +83,15 @@ class Component:
     """ROBOT.COMPONENT, by the labels where there are any."""
     robot: str
     channel: str
-    settings: SensorSettings | ActuatorSettings
+    settings: ComponentSettings
     deployment: Deployment
     row: Row
     fields: Fields | None = None
     """The newest reading, or the last command; None before the first."""
     time_ns: int = -1
     """When that was sent, in simulated time."""
+    count: int = 0
+    """How many readings have come, or commands were sent."""
     status: str = "Stop"
     """Of an actuator with jobs: `Transit` while one runs, `Arrived` when it is done, else `Stop`."""
 
@@ -98,7 +101,7 @@ class Component:
         return self.row.out is not None
 
 
-def row_of(settings: SensorSettings | ActuatorSettings, morse: str = "") -> Row:
+def row_of(settings: ComponentSettings, morse: str = "") -> Row:
     """Return the row of a component type: of several the class `morse`, or the first one. Raises UnknownName."""
     is_out = isinstance(settings, SensorSettings)
     found = [row for row in ROWS if row.kind == settings.kind and (row.out is not None) is is_out]
@@ -138,13 +141,18 @@ def call(component: Component, service: str, parameters: list[Any]) -> Any:
     its = services_of(component.row).get(service)
     if its is None:
         raise Refused(f"The request {service} has not been registered in {MANAGER}")
+    return checked(service, partial(its, component), parameters)
+
+
+def checked(service: str, its: Callable[..., Any], parameters: list[Any]) -> Any:
+    """Call a function for a service. Raises Refused, with the texts of MORSE's manager."""
     try:
-        inspect.signature(its).bind(component, *parameters)
+        inspect.signature(its).bind(*parameters)
     except TypeError as error:
         what = "wrong # of parameters for service {}." if parameters else "parameters expected for service {}!"
         raise Refused(f"{MANAGER}: {what.format(service)} {error}") from None
     try:
-        return its(component, *parameters)
+        return its(*parameters)
     except (TypeError, ValueError, LookupError, AttributeError) as error:
         raise Refused(f"{MANAGER}: wrong parameter type for service {service}. {error}") from None
 
@@ -260,7 +268,7 @@ def _place(x: float, y: float, z: float, tolerance: float, speed: float) -> Fiel
     return dict(zip(("x", "y", "z", "tolerance", "speed"), numbers, strict=True))
 
 
-def _plain(settings: SensorSettings | ActuatorSettings) -> Row:
+def _plain(settings: ComponentSettings) -> Row:
     """Return the row of a component type outside of the table: its fields are those of its reading or command."""
     codec = codec_of(settings.component_type)
     names = tuple(one.name for one in codec.fields if not (codec.has_job and one.name == "job"))

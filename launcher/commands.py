@@ -39,13 +39,18 @@ KINDS: Final = {
     VHUB: Kind((*ROLE, "vhub"), "unless refused", True, "lost by deadlines of the supervisor, and alive"),
     "node": Kind((*ROLE, "node"), "always", False, "lost by deadlines of the supervisor, and alive"),
     "player": Kind((*ROLE, "player"), "after a signal", False, "deadlines of the vHub, which end the run"),
+    "gateway": Kind((*ROLE, "gateway"), "unless refused", False, "none: the run continues without it"),
 }
-"""By role: supervisor, vHub, any node, any player."""
+"""By role: supervisor, vHub, any node, any player, any gateway."""
 
 
 def kinds_of(roles: Iterable[str], deployment: Deployment) -> list[Kind]:
     """Return the kinds of some roles of a run."""
-    return [KINDS.get(role, KINDS["node" if role in deployment.nodes else "player"]) for role in roles]
+    return [KINDS.get(role) or KINDS[_kind_of(role, deployment)] for role in roles]
+
+
+def _kind_of(role: str, deployment: Deployment) -> str:
+    return "node" if role in deployment.nodes else "gateway" if role in deployment.gateways else "player"
 
 
 class Commands:
@@ -57,8 +62,10 @@ class Commands:
         self._capture = capture
 
     def needs_radio(self, process: Process) -> bool:
-        """Whether a process connects to the radio plane of another one: it has players and no vHub."""
-        return VHUB not in process.roles and any(role in self._plan.deployment.players for role in process.roles)
+        """Whether a process connects to the radio plane of another one: it has players or a gateway, and no vHub."""
+        deployment = self._plan.deployment
+        clients = {*deployment.players, *deployment.gateways}
+        return VHUB not in process.roles and not clients.isdisjoint(process.roles)
 
     def of(self, process: Process, info: RunInfo | None, remote: Remote | None = None) -> list[str]:
         """Return the command line of a process.
@@ -78,6 +85,8 @@ class Commands:
         insecure = ["--insecure"] if options.insecure else []
         if players == [*roles]:
             return [*KINDS["player"].command, *_each("--name", players), "--connect", radio, *path, *pki]
+        if roles[0] in deployment.gateways:
+            return [*KINDS["gateway"].command, "--name", *roles, "--connect", radio, "--supervisor", simulation, *pki]
         if not process.is_shared:
             (kind,) = kinds_of(roles, deployment)
             if SUPERVISOR in roles:

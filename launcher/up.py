@@ -1,7 +1,7 @@
 """`up`: starts all processes of a run, here and on other machines, shows the run, and ends it in order.
 
-Supervisor, vHub, nodes and players are its children and run the simulation; it starts and monitors them, requests the
-status that it shows, and forwards a Ctrl-C.
+Supervisor, vHub, nodes, players and gateways are its children and run the simulation; it starts and monitors them,
+requests the status that it shows, and forwards a Ctrl-C.
 """
 
 from __future__ import annotations
@@ -205,9 +205,10 @@ class Up:
         name = process.name
         command = self._commands.of(process, info, self._launcher.remotes.get(name))
         if self.plan.deployment.launch_of(name) == "manual":
-            is_player = name in self.plan.deployment.players
-            what, where = ("player", "in a terminal of its own") if is_player else ("node", "on its machine")
-            if not is_player and self.plan.options.pki is not None:
+            is_node = name in self.plan.deployment.nodes
+            what = "node" if is_node else "gateway" if name in self.plan.deployment.gateways else "player"
+            where = "on its machine" if is_node else "in a terminal of its own"
+            if is_node and self.plan.options.pki is not None:
                 command, where = [*command[:-1], "DIR"], f"{where}, DIR being the folder of its certificate there"
             self.display.say(f"waiting for {what} {name}; start it {where}: {shlex.join(command)}")
         else:
@@ -432,6 +433,8 @@ class Up:
         restarts = {kind.restart for kind in kinds_of(roles, self.plan.deployment)}
         is_given_up = child.name in self._restarts.failed
         is_lost = child.how.is_by_signal or child.is_away
+        if child.name in self.plan.deployment.gateways:
+            return not is_given_up
         if "unless refused" in restarts and (child.exit_code == REFUSED or is_given_up):
             return False
         if not self._has_begun:
@@ -479,6 +482,8 @@ class Up:
 
     def _ends_run(self, child: Child) -> bool:
         """Whether the run cannot continue without this child, which has ended."""
+        if child.name in self.plan.deployment.gateways:
+            return False
         return (child.exit_code != DONE or child.left_early) and not self._comes_back(child)
 
     def _look_for_lost(self, now_s: float) -> None:

@@ -27,13 +27,16 @@ def of_role(role: str, deployment: Deployment) -> str:
 
 
 def of_process(its: Process, deployment: Deployment) -> list[str]:
-    """Return the identities that a process needs: as a router, as a client of the simulation plane, and of players.
+    """Return the identities that a process needs: as a router, as a client of the simulation plane, and of players and
+    gateways.
 
     Beside the supervisor nodes need none, beside the vHub players.
     """
     routers: list[str] = [role for role in (SUPERVISOR, VHUB) if role in its.roles]
     nodes = [f"node.{role}" for role in its.roles if role in deployment.nodes and SUPERVISOR not in its.roles]
     players = [f"client.{role}" for role in its.roles if role in deployment.players and VHUB not in its.roles]
+    gateways = [(role, deployment.gateways[role]) for role in its.roles if role in deployment.gateways]
+    players += [f"client.{name}" for role, gateway in gateways for name in gateway.clients(role).values()]
     return [*routers, *([f"process.{its.name}"] if is_joint(its, deployment) else nodes), *players]
 
 

@@ -37,6 +37,10 @@ SPARE_BYTES: Final = 64 * 1024
 Content = TypeVar("Content")
 
 
+GATEWAY: Final = "gateway."
+"""Before the name of a gateway, in the name of its file."""
+
+
 class NoRun(Failed):
     """There is no such run, or none that is live."""
 
@@ -163,6 +167,16 @@ class RunFolder:
     def result(self) -> dict[str, Any] | None:
         """Return how the run ended, or None when it did not end in order."""
         return self._read(RESULT_FILE, dict[str, Any])
+
+    def write_gateway(self, name: str, content: dict[str, Any]) -> None:
+        """Write which programs are at a gateway. Raises OSError."""
+        _replace(self.path / f"{GATEWAY}{name}.json", content)
+
+    def gateways(self) -> dict[str, dict[str, Any]]:
+        """Return which programs are at each gateway that has written it, by name."""
+        files = sorted(self.path.glob(f"{GATEWAY}*.json"))
+        found = {path.stem.removeprefix(GATEWAY): self._read(path.name, dict[str, Any]) for path in files}
+        return {name: content for name, content in found.items() if content is not None}
 
     def _read(self, name: str, kind: type[Content]) -> Content | None:
         try:

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Final
+from typing import Final, TypeGuard
 
 from foosim.common import limits
 from foosim.common.errors import BadValue
@@ -25,6 +25,7 @@ from foosim.deployment.text.report import Report, Stopped
 from foosim.deployment.text.selection import Chosen, Population, TooManyComparisons, is_several
 from foosim.deployment.text.templates import LIKE, TEMPLATES, Templates, merged, with_preset, without
 from foosim.deployment.text.yaml import DEPTH_MAX, Fields, Items, Leaf, Place, Problem, Tree, measure, plain
+from foosim.world.component_types.settings import client_on
 from foosim.world.scenery import SCENERY_MAX
 
 REST: Final = "rest"
@@ -37,6 +38,10 @@ FLEETS: Final[dict[str, int]] = {
 """Sections whose entries may have a count, and how many entries there are at most."""
 FOR_ROBOTS: Final[dict[str, int]] = {"players": limits.CLIENTS_MAX, "clients": limits.CLIENTS_MAX}
 """The same of those whose entries may be for each robot."""
+GATEWAYS: Final = "gateways"
+CLIENTS: Final = "clients"
+SYNC: Final = "sync"
+"""The key of a gateway that makes its own client one in lockstep, with its rate."""
 ENTRIES: Final = (*FLEETS, *FOR_ROBOTS)
 """Sections whose entries may be like templates."""
 
@@ -96,7 +101,11 @@ class Expansion:
             what = "a text that came without its files, which has to stand alone"
             report.add(values[INCLUDE].place, (INCLUDE,), what, plain(values[INCLUDE]))
         values |= {name: node for name in values if name != TEMPLATES and (node := self.section(name))}
-        whole = without(Fields(self._tree.place, values, self._tree.keys), TEMPLATES, INCLUDE)
+        keys = dict(self._tree.keys)
+        if isinstance(gateways := values.get(GATEWAYS), Fields):
+            values[GATEWAYS], values[CLIENTS] = self._with_clients(gateways, values.get(CLIENTS))
+            keys.setdefault(CLIENTS, keys[GATEWAYS])
+        whole = without(Fields(self._tree.place, values, keys), TEMPLATES, INCLUDE)
         depth, nodes = measure(whole, {})
         if depth > DEPTH_MAX:
             report.add(whole.place, (), f"nested more than {DEPTH_MAX} deep when expanded", depth)
@@ -233,6 +242,32 @@ class Expansion:
                 found[one] = partial(filled_entry, values=values, node=self._owners.get(robot))
         return found
 
+    def _with_clients(self, gateways: Fields, clients: Tree | None) -> tuple[Fields, Tree]:
+        """Return the gateways with the names of their robots, and the clients with theirs."""
+        declared = clients if isinstance(clients, Fields) else Fields(gateways.place)
+        whole = Fields(gateways.place, dict(gateways.values), gateways.keys)
+        found = Fields(declared.place, dict(declared.values), dict(declared.keys))
+        for name, entry in gateways.values.items():
+            if not isinstance(entry, Fields):
+                continue
+            place, path = gateways.keys[name], (GATEWAYS, name, ROBOTS)
+            given = entry.values.get(ROBOTS, Items(place, [Leaf(place, "*")]))
+            if not isinstance(given, Items):
+                continue
+            robots = self._listed(given, path)
+            whole.values[name] = Fields(entry.place, {**entry.values, ROBOTS: robots}, {ROBOTS: place, **entry.keys})
+            sync = entry.values.get(SYNC)
+            own = {"lockstep": Leaf(place, True), "rate": sync.values["rate"]} if _has_rate(sync) else {}
+            made = {name: (own, place)}
+            for robot in robots.items:
+                if isinstance(robot, Leaf) and isinstance(robot.value, str):
+                    made[client_on(name, robot.value)] = {"on": robot}, robot.place
+            for one, (values, at) in made.items():
+                if one in found.values:
+                    self._report.add(at, path[:2], "it makes a client of a name that there is", one)
+                found.values[one], found.keys[one] = Fields(at, dict(values), dict.fromkeys(values, at)), at
+        return whole, found if isinstance(clients, Fields | None) else clients
+
     # --- the lists of nodes -------------------------------------------------------------------------------------------
 
     @cached_property
@@ -331,6 +366,10 @@ class Expansion:
             self._named_robots[id(robots)] = robots, named
         self._report.count(named, robots.place, (*path, ROBOTS))
         return Fields(entry.place, {**entry.values, ROBOTS: named}, entry.keys)
+
+
+def _has_rate(sync: Tree | None) -> TypeGuard[Fields]:
+    return isinstance(sync, Fields) and "rate" in sync.values
 
 
 def _maker(section: Fields, key: str) -> tuple[str, Place, Place]:

@@ -79,10 +79,14 @@ class Loop:
         collect_seldom()
         self.notify.ready(time.monotonic_ns())
 
-    def go_round(self) -> None:
-        """Sleep until a message or a deadline, then handle it."""
-        due_ns = min([self._sign_ns, *(role.wake_ns for role in self.roles)])
-        items = self._take(due_ns)
+    def next_ns(self) -> int:
+        """When the next round is due without a message (monotonic clock); 0 while there is work left."""
+        return 0 if self._is_busy else self._due_ns()
+
+    def go_round(self, *, sleeps: bool = True) -> None:
+        """Sleep until a message or a deadline, unless another loop does that; handle what has come and is due."""
+        due_ns = self._due_ns()
+        items = self._take(due_ns) if sleeps else self._inbox.take(0)
         now_ns = time.monotonic_ns()
         stood_ns = self._standstill.look(due_ns, now_ns)
         if stood_ns:
@@ -101,9 +105,16 @@ class Loop:
         for role in self.roles:
             role.perform()
 
+    def _due_ns(self) -> int:
+        return min([self._sign_ns, *(role.wake_ns for role in self.roles)])
+
+    @property
+    def _is_busy(self) -> bool:
+        return self._has_work or not (self._bus is None or self._bus.is_empty)
+
     def _take(self, due_ns: int) -> list[Item]:
         """Return the messages from other processes; wait for them while no role has anything to do."""
-        if self._has_work or not (self._bus is None or self._bus.is_empty):
+        if self._is_busy:
             return self._inbox.take(0)
         lacking = self.roles[0].lacking() if self._bus is None and self.roles else None
         lacks, count = ("", 1) if lacking is None else (lacking[0].key, lacking[1])

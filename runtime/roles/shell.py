@@ -106,14 +106,26 @@ class Runnable(Protocol):
 class Process:
     """The shells of the roles of a process, on one loop and one inbox."""
 
-    def __init__(self, name: str, progress: Path | None = None, *, is_shared: bool = False) -> None:
-        """`is_shared`: it has several roles. `progress` is the file that shows the loop's progress."""
+    def __init__(
+        self,
+        name: str,
+        progress: Path | None = None,
+        *,
+        is_shared: bool = False,
+        on_offer: Callable[[], None] | None = None,
+    ) -> None:
+        """`is_shared`: it has several roles. `progress` is the file that shows the loop's progress.
+
+        `on_offer` is for a process that another event loop drives (`step`): see `Inbox`.
+        """
         self._bus = Bus() if is_shared else None
-        self.inbox: Final = Inbox(limits.INBOX_MESSAGES_MAX)
+        self.inbox: Final = Inbox(limits.INBOX_MESSAGES_MAX, on_offer)
         self.loop: Final = Loop(self.inbox, start_log(name), self._bus)
         self.loop.show_progress(progress)
         self.loop.notify = Notify()
         self._shells: list[Runnable] = []
+        self._code = DONE
+        self._failures: list[Failed] = []
 
     def wire(self, session: Session, plane: Plane, name: str) -> Wire:
         """Return a wire of one of its roles."""
@@ -130,22 +142,30 @@ class Process:
         A role that ends unfinished ends the others too, except the supervisor, which ends the run in
         order. One that raises Failed at its end lets the others end.
         """
-        failures: list[Failed] = []
-        code = DONE
         try:
             self.loop.begin()
-            while True:
-                code = max(code, self._finish_ended(failures))
-                if not self._shells or (code != DONE and not self._has_supervisor):
-                    break
+            while not self._is_over():
                 self.loop.go_round()
         except BaseException:
             self._leave()
             raise
+        return self.end()
+
+    def step(self) -> int | None:
+        """Do one round without sleeping, in a process that another event loop drives.
+
+        Return when the next one is due (ns of the monotonic clock), unless `on_offer` is called before; None when the
+        process is over. `self.loop.begin()` is before the first step, `end` after the last one, or after an exception.
+        """
+        self.loop.go_round(sleeps=False)
+        return None if self._is_over() else self.loop.next_ns()
+
+    def end(self) -> int:
+        """End the remaining roles; return the greatest of all exit codes. Raises Failed, that of the first role."""
         self._leave()
-        if failures:
-            raise failures[0]
-        return code
+        if self._failures:
+            raise self._failures[0]
+        return self._code
 
     def stop(self) -> None:
         """Have all roles be over soon; a signal handler may call this. A supervisor ends its run, and so the others."""
@@ -154,21 +174,20 @@ class Process:
                 shell.stop()
         self.inbox.wake()
 
-    def _finish_ended(self, failures: list[Failed]) -> int:
-        """Finish the roles that are over; return the greatest of their exit codes."""
+    def _is_over(self) -> bool:
+        """Finish the roles that are over; return whether the process is."""
         ended = [shell for shell in self._shells if shell.is_over()]
         if len(ended) == len(self._shells):
             self.loop.notify.stopping()
-        code = DONE
         for shell in ended:
             self._shells.remove(shell)
             try:
-                code = max(code, shell.finish())
+                self._code = max(self._code, shell.finish())
             except Failed as failed:
-                failures.append(failed)
+                self._failures.append(failed)
             finally:
                 self.loop.remove(shell.role)
-        return code
+        return not self._shells or (self._code != DONE and not self._has_supervisor)
 
     @property
     def _has_supervisor(self) -> bool:

@@ -35,7 +35,7 @@ class Wire:
         """Read these channels: (channel, whether only messages to this name).
 
         `waits` are those in whose queues the reader of a process with one role itself waits: the fastest path, for
-        messages of every tick.
+        messages of every tick. With `on_offer`, its inbox has no reader that waits.
         """
         here = [(channel, own) for channel, own in reads if channel.plane is self.plane]
         if self._bus is not None:
@@ -43,6 +43,7 @@ class Wire:
             if self.session.is_open_router and self.plane is Plane.SIMULATION:
                 self._receive_plane()
                 return
+        in_queue = waits if self._bus is None and self._inbox.on_offer is None else ()
         mine = {channel.key for channel, own in here if own}
         wanted = {channel.key for channel, _ in here}
 
@@ -54,7 +55,7 @@ class Wire:
 
         for channel, own in here:
             key = channel.key_for(self.name) if own else channel.key_for_all
-            if self._bus is None and channel in waits:
+            if channel in in_queue:
                 self.session.receive(key, channel.key, read_key, self._inbox)
             else:
                 self.session.subscribe(key, channel.key, self._inbox)

@@ -7,6 +7,8 @@ A waiting reader costs a wake-up for each message, and a receiving thread betwee
 quarter of the cost of a tick's messages. So an inbox can have `Source`s, in one of whose queues the reader itself
 waits: that of the channel that it lacks, so that no other message wakes it. It empties the others whenever it is awake;
 an offer of a thread rings the bell of the queue in which it waits.
+
+A reader that never waits, since it runs on another program's event loop, has `on_offer` in place of that.
 """
 
 from __future__ import annotations
@@ -42,9 +44,12 @@ class Source(Protocol):
 class Inbox:
     """Items from many threads for one reader. A full inbox drops the newest item and counts it."""
 
-    def __init__(self, limit: int) -> None:
+    def __init__(self, limit: int, on_offer: Callable[[], None] | None = None) -> None:
+        """`on_offer` is called by a receiving thread once there is an item, and not again before the next take; and by
+        `wake`. Such an inbox has no sources."""
         assert limit >= 1, limit
         self.limit: Final = limit
+        self.on_offer: Final = on_offer
         self._items: list[Item] = []
         self._guard = threading.Lock()
         self._waiting = False
@@ -65,8 +70,11 @@ class Inbox:
             if len(self._items) >= self.limit:
                 self.dropped += 1
                 return False
+            is_first = not self._items
             self._items.append(item)
         self._ring()
+        if is_first and self.on_offer is not None:
+            self.on_offer()
         return True
 
     def take(self, timeout_s: float | None, lacking: str = "", count: int = 1) -> list[Item]:
@@ -102,10 +110,12 @@ class Inbox:
         """End the reader's take, or its next one that would wait. A signal handler may call this: it takes no lock."""
         self._woken = True
         self._ring()
+        if self.on_offer is not None:
+            self.on_offer()
 
     def attach(self, source: Source, channel: str) -> None:
         """Let the reader wait in this channel's queue; to be called by the reader, or before its first take."""
-        assert channel not in self._sources, channel
+        assert channel not in self._sources and self.on_offer is None, channel
         if self._alarm is None:
             self._alarm = _Alarm(self._ring)
         self._sources[channel] = source

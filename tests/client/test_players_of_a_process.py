@@ -19,7 +19,7 @@ import typer
 
 from foosim.client import main as client_main
 from foosim.client.errors import PlayerError
-from foosim.client.main import PlayerShell, run_players
+from foosim.client.main import ClientShell, run_players
 from foosim.client.player import Commands, Player, Samples
 from foosim.common.errors import BadValue
 from foosim.deployment.loader import apply_sets
@@ -85,14 +85,15 @@ class Bench:
     """A process with two players and a vHub; `say` lets a message come to a player and returns the answers."""
 
     def __init__(self, plane: Session) -> None:
-        self.process = Process("players", is_shared=True)
+        self.rings = 0
+        self.process = Process("players", is_shared=True, on_offer=self._ring)
         self.hub = Hub()
         self.hub_role = Role(VHUB, self.hub, logging.getLogger("hub"), lambda now_ns: LATER_NS)
         wire = self.process.wire(plane, Plane.RADIO, VHUB)
         self.hub_role.connect(wire)
         wire.read(channels.VHUB_READS)
         self.process.loop.add(self.hub_role)
-        self.players = {name: PlayerShell(self.process, name, plane) for name in (RED, BLUE)}
+        self.players = {name: ClientShell(self.process, name, plane) for name in (RED, BLUE)}
         for player in self.players.values():
             self.process.add(player)
 
@@ -105,6 +106,9 @@ class Bench:
             self.process.inbox.wake()
             self.process.loop.go_round()
         return list(self.hub.heard)
+
+    def _ring(self) -> None:
+        self.rings += 1
 
     def welcome(self, name: str, text: str = "") -> list[tuple[str, Any]]:
         boot = self.players[name].core.boot
@@ -199,6 +203,25 @@ def test_it_is_over_when_the_run_has_ended_for_all(begun: Bench) -> None:
         begun.say((channels.DOWN, name, Down(1, 9, 0, [], True)))
         assert begun.players[name].is_over()
     assert begun.run() == DONE
+
+
+def test_another_event_loop_may_drive_the_process_and_it_ends_in_the_same_way(begun: Bench) -> None:
+    process = begun.process
+    begun.hub.heard.clear()
+
+    def offered(name: str, message: Any) -> int | None:
+        rings = begun.rings
+        process.inbox.offer((channels.DOWN.key, name, encode(message)))
+        process.inbox.offer(("stranger", name, b""))
+        assert begun.rings == rings + 1, "once for what one step takes"
+        return process.step()
+
+    assert offered(BLUE, Go(1, 5, 0, [])) == 0 and begun.hub.heard == [], "the answer is on the bus"
+    due_ns = process.step()
+    assert due_ns is not None and due_ns > 0 and [name for name, _ in begun.hub.heard] == [BLUE]
+    process.loop.remove(begun.hub_role)
+    assert offered(RED, Down(1, 9, 0, [], True)) == due_ns
+    assert offered(BLUE, Down(2, 9, 0, [], True)) is None and process.end() == DONE
 
 
 def test_a_vhub_that_is_gone_is_missed_by_all_and_lost_for_good_in_the_end(

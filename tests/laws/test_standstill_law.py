@@ -18,7 +18,7 @@ import pytest
 
 from foosim.client.client import Link
 from foosim.client.core import ClientCore
-from foosim.client.main import PlayerShell
+from foosim.client.main import ClientShell
 from foosim.common.units import Pace
 from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
@@ -235,7 +235,7 @@ SHELLS: Final[dict[str, tuple[Callable[[Process, Session, Path], Runnable], type
         "rest",
     ),
     "node": (lambda process, session, _: NodeShell(process, "n1", session), SupervisorTimeout, "rest"),
-    "player": (lambda process, session, _: PlayerShell(process, PLAYERS[0], session), ClientCore, "rest"),
+    "player": (lambda process, session, _: ClientShell(process, PLAYERS[0], session), ClientCore, "rest"),
 }
 
 

@@ -189,6 +189,32 @@ def test_wake_ends_a_wait_or_the_next_one(make: Callable[[], Inbox]) -> None:
     assert inbox.take(None) == [item("a")]
 
 
+def test_a_reader_that_never_waits_is_notified_and_misses_nothing() -> None:
+    bell, read, names = threading.Semaphore(0), list[Item](), ("a", "b")
+    inbox = Inbox(2 * ALL, bell.release)
+
+    def write(name: str) -> None:
+        for number in range(ALL):
+            assert inbox.offer(item(name, number))
+
+    writers = [threading.Thread(target=write, args=(name,)) for name in names]
+    for writer in writers:
+        writer.start()
+    while len(read) < 2 * ALL:
+        assert bell.acquire(timeout=LONG_S)
+        read += inbox.take(0)
+    for writer in writers:
+        writer.join()
+    assert sorted(read) == sorted(item(name, number) for name in names for number in range(ALL))
+    while bell.acquire(blocking=False):  # of an item that a take for another one had taken
+        assert inbox.take(0) == []
+    inbox.offer(item("a"))
+    inbox.offer(item("b"))
+    assert bell.acquire(blocking=False) and not bell.acquire(blocking=False), "one take is for both"
+    inbox.wake()
+    assert bell.acquire(blocking=False)
+
+
 def test_a_signal_handler_may_wake_the_reader_that_it_interrupts() -> None:
     inbox = Inbox(3)
     old = signal.signal(signal.SIGALRM, lambda number, frame: inbox.wake())

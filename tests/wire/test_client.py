@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+from threading import Event
 from typing import TYPE_CHECKING
 
 import pytest
@@ -74,14 +76,16 @@ def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_
     up = house.up("--set", CLIENTS.replace("true, rate: 100 Hz", "false"), "--set", "engine=pure", *ONE)
     info = house.info()
     assert_strangers_are_refused(info)
+    due = Event()
     with (
-        connect("run:newest", "ear", timeout_s=PATIENCE_S) as client,
+        connect("run:newest", "ear", timeout_s=PATIENCE_S, notify=due.set) as client,
         connect(f"run:{info.run}", "hand", timeout_s=PATIENCE_S) as other,
     ):
         with pytest.raises(ConnectionRefused, match="a client hand is already here"):
             connect(info.radio, "hand", timeout_s=PATIENCE_S)
         assert_wrong_names_are_told(client)
         client.listen([("camera", "ball")])
+        assert isfinite(client.deadline_s()), "Join is repeated"
         with pytest.raises(NotJoined):
             client.subscribe("red.goal", "encoder")
         with pytest.raises(UnknownName, match="unknown destination"):
@@ -95,7 +99,9 @@ def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_
             assert number < 10_000
             client.robots["blue.goal"].send("echo", b"%d" % number)
             other.send("ear", "talk", b"%d" % number)
-            for packet in client.receive(0.05):
+            assert due.wait(PATIENCE_S), "the camera is heard"
+            due.clear()
+            for packet in client.receive(0.0):
                 if packet.channel == "echo":
                     assert (packet.source, packet.value) == ("blue.goal", packet.payload)
                     assert packet.due_ns > packet.sent_ns
@@ -105,8 +111,9 @@ def test_free_running_clients_hear_robots_and_one_another_and_who_is_refused_is_
         assert {int(payload) for payload in back + heard} <= set(range(1, number + 1))
         control.request("down")
         with pytest.raises(RunEnded):
-            while True:
-                client.receive(PATIENCE_S)
+            while due.wait(PATIENCE_S):
+                due.clear()
+                client.receive(0.0)
         with pytest.raises(RunEnded):
             client.send("camera", "echo", b"")
     code, _, err = house.end(up)

@@ -48,7 +48,9 @@ if TYPE_CHECKING:
 GROUP: Final = "foosim.world"
 LIBRARY: Final = "foosim.library"
 """Where foosim's own are: each in a module of its name, in a folder for the kind of world."""
-TYPE_NAMES: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit")
+GATEWAYS: Final = "foosim.gateways"
+"""Where foosim's own gateways are: each is a module or a package of its name."""
+TYPE_NAMES: Final = ("model", "sensor", "actuator", "modifier", "rule", "entity_rule", "scene", "kit", "gateway")
 BY_CLASS: Final = "module:Class"
 """The notation of a component type by its class, beside its name."""
 
@@ -114,6 +116,11 @@ def scene(name: str, settings: type[ComponentSettings], *, kit: str = "") -> Dec
 def kit(name: str, settings: type[SpecBase], **about: Any) -> Decorator:
     """Register a kit: a class derived from `Kit`; `about` are fields of `descriptions.Kit`."""
     return _registering(Kit, "kit", name, settings, **about)
+
+
+def gateway(name: str, settings: type[ComponentSettings]) -> Decorator:
+    """Register a gateway: a class derived from `Gateway`."""
+    return _registering(ComponentType, "gateway", name, settings)
 
 
 def _registering(kind: type[Any], type_name: str, name: str, settings: type[Any], **about: Any) -> Decorator:
@@ -296,6 +303,8 @@ def _own_modules() -> Mapping[str, Sequence[str]]:
         for module in iter_modules([f"{folder}/{kind}" for folder in folders]):
             if not module.ispkg:
                 found.setdefault(module.name, []).append(f"{LIBRARY}.{kind}.{module.name}")
+    for module in iter_modules(import_module(GATEWAYS).__path__):
+        found.setdefault(module.name, []).append(f"{GATEWAYS}.{module.name}")
     return found
 
 

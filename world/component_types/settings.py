@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, PrivateAttr, SerializeAsAny, StringConstraints
 
@@ -32,6 +32,14 @@ Label = Annotated[
     Field(description=f"1 to {LABEL_LENGTH_MAX} printable characters"),
 ]
 """The name for people and for other programs, in place of the name in the deployment; any printable characters."""
+
+RobotSelector = Annotated[str, StringConstraints(pattern=names.SELECTOR_PATTERN, max_length=names.SELECTOR_LENGTH_MAX)]
+"""Robots by name, or by a pattern of names."""
+
+
+def client_on(gateway: str, robot: str) -> str:
+    """Return the name of a gateway's client on board of a robot."""
+    return f"{gateway}-{robot.replace('.', '-')}"
 
 
 class TypedSettings(SpecBase):
@@ -98,6 +106,24 @@ class SceneSettings(ComponentSettings):
     """The settings of each scene."""
 
 
+class GatewaySettings(ComponentSettings):
+    """The settings of each gateway: the robots that it serves, and who starts its process.
+
+    On board of each of these is a client of the run, `NAME-ROBOT`, with dots as dashes, which hears the robot's sensors
+    and commands it; the client `NAME` is on board of none. `classes` chooses the class of a component, `ROBOT.CHANNEL`,
+    where its type has several; `alter` are the frames in which its numbers are given, in order.
+    """
+
+    robots: list[RobotSelector] = Field(default=["*"], max_length=limits.ENTITIES_MAX)
+    launch: Literal["local", "manual"] = "local"
+    classes: dict[str, str] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    alter: dict[str, list[str]] = Field(default={}, max_length=limits.ENTITIES_MAX)
+
+    def clients(self, name: str) -> dict[str, str]:
+        """Return the clients of the gateway with this name by robot; its own one is that of no robot, an empty name."""
+        return {"": name} | {robot: client_on(name, robot) for robot in self.robots}
+
+
 class EntitySettings(TypedSettings):
     """The settings of every entity: its model, a registered name or `module:Class`.
 
@@ -143,6 +169,7 @@ BASES: Final[Mapping[str, type[SpecBase]]] = MappingProxyType(
         "entity_rule": EntityRuleSettings,
         "rule": RuleSettings,
         "scene": SceneSettings,
+        "gateway": GatewaySettings,
         "model": EntitySettings,
     }
 )

@@ -1,0 +1,206 @@
+"""A run as gateways see it: components, commands, jobs, and packets between robots.
+
+It has no clock, socket or thread: packets that have arrived are handed to it, and packets leave by a function, so tests
+drive it with the packets of a simulation in their own process.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from foosim.client.commands import CommandEncoder
+from foosim.client.jobs import Job, Jobs
+from foosim.client.player import Packet
+from foosim.client.playing import Newest
+from foosim.common.errors import Malformed, Refused
+from foosim.common.json_text import decode_json, encode_json
+from foosim.deployment.channel_kinds import channels_of
+from foosim.deployment.schema import Deployment
+from foosim.gateways.components import RADIO, RECEIVED, components_of
+from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, label_of
+from foosim.protocol.messages import Received
+from foosim.world.component_types.jobs import JobState
+
+Send = Callable[[str, Packet], None]
+"""Sends a packet of the client with a name."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Called:
+    """A service that takes time; when its job has ended `ended` is called. `answer` is that of one that is done."""
+
+    component: Component
+    job: Job
+    answer: Any
+    ended: Callable[[Called], None]
+
+
+class Listener:
+    """What follows a run. The hooks do nothing."""
+
+    def arrived(self, component: Component) -> None:
+        """A reading has arrived: its fields are in `component.fields`, its time in `component.time_ns`."""
+
+    def advanced(self) -> None:
+        """The newest tick that is known, `Run.tick`, has changed."""
+
+
+class Run:
+    """The run of a gateway."""
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        name: str,
+        send: Send,
+        proceed: Callable[[], None],
+    ) -> None:
+        """`name` is the gateway's. `proceed` continues the tick that waits for it."""
+        self.deployment: Final = deployment
+        self.name: Final = name
+        self.settings: Final = deployment.gateways[name]
+        self.proceed: Final = proceed
+        self.tick = -1
+        """The newest that is known."""
+        self.listeners: Final[list[Listener]] = []
+        self.clients: Final = self.settings.clients(name)
+        """The names of the gateway's clients by robot; its own one is that of no robot."""
+        self.robots: Final = {label_of(deployment, robot): robot for robot in self.settings.robots}
+        """By label."""
+        found = components_of(deployment, self.settings)
+        self.components: Final = {one.full: one for one in found.values()}
+        """By MORSE's names, `ROBOT.COMPONENT`, of labels where there are any."""
+        self._by_channel = {(one.robot, one.channel): one for one in found.values()}
+        self._channels = channels_of(deployment, [pair for robot in self.clients for pair in self.heard(robot)])
+        self._reports = Newest({pair: its for pair, its in self._channels.items() if pair not in self._by_channel})
+        self._jobs: dict[str, Jobs] = {}
+        self._called: list[Called] = []
+        self._encoder, self._send, self._log = CommandEncoder(deployment), send, logging.getLogger(name)
+
+    @property
+    def time_s(self) -> float:
+        """The simulated time of the newest tick that is known."""
+        return max(self.tick, 0) * self.deployment.tick_ns / 1e9
+
+    def heard(self, robot: str) -> Iterator[tuple[str, str]]:
+        """Yield the (endpoint, channel) to which the client on board of a robot subscribes."""
+        if robot:
+            yield from ((robot, channel) for channel in self.deployment.robots[robot].sensors)
+
+    # --- from the run -------------------------------------------------------------------------------------------------
+
+    def arrived(self, robot: str, packets: Iterable[Received], tick: int) -> None:
+        """Take the packets of the client on board of a robot in order of arrival, and the newest tick."""
+        packets = list(packets)
+        for packet in packets:
+            component = self._by_channel.get((packet.source, packet.channel))
+            if component is not None:
+                self._measured(component, packet)
+            elif packet.channel == RADIO:
+                self._received(robot, packet)
+        self._reports.take(packets)
+        if tick > self.tick:
+            self.tick = tick
+            for listener in self.listeners:
+                listener.advanced()
+        if self._called:
+            self._look_at_jobs()
+
+    def _measured(self, component: Component, packet: Received) -> None:
+        codec, _ = self._channels[packet.source, packet.channel]
+        assert codec is not None and component.row.out is not None, "sensors have a codec"
+        try:
+            value = codec.decode(packet.payload)
+        except Malformed as malformed:
+            self._log.warning("%s: %s", component.full, malformed)
+            return
+        self._deliver(component, component.row.out(value, component), packet)
+
+    def _received(self, robot: str, packet: Received) -> None:
+        sender = next((robot for robot, client in self.clients.items() if client == packet.source), "")
+        component = self._by_channel.get((robot, RECEIVED))
+        try:
+            data = decode_json(packet.payload)
+        except Malformed as malformed:
+            self._log.warning("a packet to %s: %s", robot, malformed)
+            return
+        if component is not None:
+            label = label_of(self.deployment, sender) if sender else packet.source
+            self._deliver(component, {"from": label, "data": data}, packet)
+
+    def _deliver(self, component: Component, fields: Fields, packet: Received) -> None:
+        component.fields, component.time_ns = fields, packet.sent_ns
+        component.count += 1
+        for listener in self.listeners:
+            listener.arrived(component)
+
+    # --- to the run ---------------------------------------------------------------------------------------------------
+
+    def command(self, component: Component, given: Mapping[str, Any]) -> None:
+        """Send a command by its fields; omitted ones keep their values. Raises Refused."""
+        fields, numbers = command(component, given)
+        component.fields = fields
+        component.count += 1
+        if component.row.kind == RADIO:
+            self._radio(component, fields)
+            return
+        taker = self._encoder.actuator(component.robot, component.channel)
+        self._send(self.clients[component.robot], Packet(component.robot, component.channel, taker.pack(numbers)))
+
+    def _radio(self, component: Component, fields: Fields) -> None:
+        to = fields["to"]
+        if to not in self.robots:
+            raise Refused(f"{component.full}: no robot {to!r} has a radio here (valid are: {', '.join(self.robots)})")
+        packet = Packet(self.clients[self.robots[to]], RADIO, encode_json(fields["data"]))
+        self._send(self.clients[component.robot], packet)
+
+    def call(
+        self, component: Component, service: str, parameters: list[Any], ended: Callable[[Called], None]
+    ) -> Called | Any:
+        """Call a service: return its answer, or what takes time, for which `ended` is called when it has ended.
+
+        Raises Refused, with the texts of MORSE.
+        """
+        result = call(component, service, parameters)
+        if not isinstance(result, Order):
+            return result
+        if result.effect is not Effect.JOB:
+            self.command(component, result.fields)
+            return result.answer
+        return self._begin(component, result, ended)
+
+    def _begin(self, component: Component, order: Order, ended: Callable[[Called], None]) -> Called:
+        fields, numbers = command(component, order.fields)
+        client = self.clients[component.robot]
+        jobs = self._jobs.get(component.full)
+        if jobs is None:
+            jobs = self._jobs[component.full] = Jobs(self.deployment, client, component.robot, component.channel)
+            jobs.hear(self._reports.samples)
+        component.fields = fields
+        called = Called(component, jobs.call(**numbers), order.answer, ended)
+        self._called.append(called)
+        self._look_at_jobs()
+        return called
+
+    def cancel(self, called: Called) -> None:
+        """Call a service off that takes time."""
+        called.job.cancel()
+        self._look_at_jobs()
+
+    def _look_at_jobs(self) -> None:
+        """Send commands of jobs that are due, and end services whose jobs have ended."""
+        tick = max(self.tick, 0)
+        for jobs in self._jobs.values():
+            jobs.hear(self._reports.samples)
+            payload = jobs.payload(tick)
+            if payload is not None:
+                self._send(self.clients[jobs.robot], Packet(jobs.robot, jobs.actuator, payload))
+        over = [called for called in self._called if called.job.state.has_ended]
+        self._called = [called for called in self._called if not called.job.state.has_ended]
+        for called in over:
+            is_done = called.job.state == JobState.DONE
+            called.component.status = "Arrived" if is_done else "Stop"
+            called.ended(called)
