@@ -12,7 +12,7 @@ from foosim.capture.new_file import new_file
 from foosim.cli.up import app as up_app
 from foosim.common import limits
 from foosim.common.errors import BadValue
-from foosim.gateways.builder.export import export
+from foosim.gateways.builder.script import export
 from foosim.runtime.command import new_app, run_app
 from foosim.runtime.run_folder import runs_folder
 
@@ -21,7 +21,11 @@ app = new_app()
 Script = Annotated[Path, typer.Argument(metavar="SCRIPT", help="A builder script of MORSE.")]
 Nodes = Annotated[
     int | None,
-    typer.Option(min=1, max=limits.NODES_MAX, help="Split the robots over so many nodes; by default as the script."),
+    typer.Option(
+        min=1,
+        max=limits.NODES_MAX,
+        help="The number of nodes, over which the robots are split; by default as in the script.",
+    ),
 ]
 
 
@@ -29,10 +33,10 @@ Nodes = Annotated[
 def morse_group() -> None:
     """Run builder scripts of the simulator MORSE.
 
-    A script runs in a process of its own, for at most 20 s, with a `morse.builder` that records. What is not here is
-    shown all at once, each with its line, and nothing is written.
+    A script runs in a process of its own, for at most 20 s, with a `morse.builder` that records. Everything unsupported
+    is shown at once, each with its line, and nothing is written.
 
-    Exit codes: 0 done, 1 failed, 2 something is not here or bad input, 3 refused, 130 second Ctrl-C.
+    Exit codes: 0 done, 1 failed, 2 unsupported or bad input, 3 refused, 130 second Ctrl-C.
     """
 
 

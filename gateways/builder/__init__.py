@@ -1,5 +1,5 @@
 """MORSE's builder: its scripts become deployments.
 
-`record` runs a script in a process of its own, `export` writes the deployment. What robots, components and scenes of
-MORSE are here is in `robots.yaml`, `components.yaml` and `scenes.yaml`.
+`script` runs one in a process of its own, where `record` notes what it makes; `export` writes the deployment. Robots,
+components and scenes of MORSE are in `robots.yaml`, `components.yaml` and `scenes.yaml`.
 """

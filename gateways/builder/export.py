@@ -1,36 +1,26 @@
-"""The deployment of a MORSE script: from what its builder recorded to text, or to all that is not here."""
+"""From what a MORSE script made to the text of a deployment, or to all problems."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from fractions import Fraction
 from importlib.resources import files
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from itertools import pairwise
 from typing import Any, Final
 
 import yaml
 
-from foosim.common.errors import DeploymentError, UnknownName
+from foosim.common.errors import UnknownName
 from foosim.common.limits import NAME_LENGTH_MAX
+from foosim.common.names import CHANNEL_ECHO
 from foosim.common.units import NS_PER_S, format_ns, format_rate
-from foosim.deployment.loader import load_deployment
 from foosim.gateways.rows import ROWS, euler
 from foosim.world.component_types import registry
 from foosim.world.scene import Quaternion, Vector, from_rpy, multiply, rotate
 
-LIMIT_S: Final = 20
-"""Wall time that a script has."""
-GRACE_S: Final = 5
-"""What a script that does not heed its end has after that."""
 BASE_HZ: Final = 60.0
 """Rate of MORSE's steps, and of a component without one of its own."""
 LINE_LENGTH_MAX: Final = 150
@@ -47,55 +37,14 @@ PLAIN: Final = re.compile(r"-?[\w./%+]+(?:[ -][\w./%+-]+)*")
 """Texts that need no quotes, beside the words of YAML."""
 
 Tree = dict[str, Any]
-"""A mapping of a deployment, or what record.py has written of one thing."""
+"""A mapping of a deployment, or what `record` has written of one thing."""
+Part = tuple[Tree, str, Tree]
+"""A component, its name below its robot, its place on it."""
 
 
 def data(name: str) -> Any:
     """Return a table of the builder."""
     return yaml.safe_load(files(MODULE).joinpath(name).read_text(encoding="utf-8"))
-
-
-def export(script: Path, nodes: int | None = None, limit_s: int = LIMIT_S) -> str:
-    """Return the text of a script's deployment, on `nodes` nodes, by default on those of the script.
-
-    Raises DeploymentError with all that is not here, each with its place in the script.
-    """
-    builder = Builder(script.name, record(script, limit_s))
-    text = builder.text(nodes)
-    if not builder.problems:
-        try:
-            load_deployment(text, script.name)
-        except DeploymentError as error:
-            builder.problems += [_in_script(line, text.splitlines()) for line in error.problems]
-    if builder.problems:
-        raise DeploymentError([*dict.fromkeys(builder.problems)])
-    return text
-
-
-def record(script: Path, limit_s: int) -> Tree:
-    """Run a script in a process of its own; return what it made. Its output goes to standard error."""
-    classes = {**data("components.yaml")["classes"], "robots": [*data("robots.yaml")["robots"]]}
-    with TemporaryDirectory() as folder:
-        known, result = Path(folder, "classes.json"), Path(folder, "result.json")
-        known.write_text(json.dumps({category: [*morses] for category, morses in classes.items()}))
-        command = [sys.executable, "-I", "-m", f"{MODULE}.record", script, known, result, str(limit_s)]
-        with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=2, start_new_session=True) as child:
-            with suppress(subprocess.TimeoutExpired):
-                child.wait(limit_s + GRACE_S)
-            with suppress(ProcessLookupError):  # with what it has forked
-                os.killpg(child.pid, signal.SIGKILL)
-        if not result.exists():
-            raise DeploymentError([f"{script.name}: the script has ended without a result, code {child.returncode}"])
-        recorded: Tree = json.loads(result.read_text())
-    return recorded
-
-
-def _in_script(problem: str, lines: list[str]) -> str:
-    """Return a problem of a deployment with the place in the script that is nearest above its own."""
-    match = re.match(r".*?:(\d+):\d+: (.*)", problem)
-    above = lines[: int(match[1])][::-1] if match else []
-    places = [found[1] for line in above if (found := re.search(r" # (\S+:\d+)", line))]
-    return f"{places[0]}: {match[2]}" if match and places else problem
 
 
 def written(tree: Tree, indent: str = "") -> Iterator[str]:
@@ -121,7 +70,7 @@ def _flow(value: Any) -> str:
 
 
 def name_of(text: str, taken: Iterable[str] = ()) -> str:
-    """Return the name here that is nearest to one of MORSE, and differs from those that are taken."""
+    """Return a valid name like one of MORSE, and unlike all names in `taken`."""
     lower = re.sub(r"[^a-z0-9_-]", "-", text.lower())
     plain = (lower if lower[:1].isalpha() else f"n{lower}")[:NAME_LENGTH_MAX]
     others = (f"{plain[: NAME_LENGTH_MAX - 5]}-{count}" for count in range(2, 10_000))
@@ -137,7 +86,7 @@ def pose(position: Iterable[float], angles: Iterable[float]) -> Tree:
 
 
 def formatted(templates: Mapping[str, str], values: Mapping[str, Any]) -> Tree:
-    """Return settings with the values that their braces name, without those whose values nobody gives."""
+    """Return settings with values in their braces; settings without values are left out."""
     named = {key: set(re.findall(r"{(\w+)}", text)) for key, text in templates.items()}
     given = {key: text for key, text in templates.items() if named[key] <= values.keys()}
     return {key: yaml.safe_load(text.format_map(values)) for key, text in given.items()}
@@ -152,6 +101,7 @@ class Builder:
     """What a script made, as sections of a deployment."""
 
     def __init__(self, script: str, recorded: Tree) -> None:
+        """`script` is the name of the file."""
         self.script, self.things = script, recorded["things"]
         self.problems: Final = [f"{place}: {text}" for place, text in recorded["problems"]]
         self.notes: Final[list[str]] = []
@@ -173,8 +123,12 @@ class Builder:
         """Add a problem."""
         self.problems.append(f"{place}: {text}")
 
+    def absent(self, place: str, what: str, name: str, choices: Iterable[str]) -> None:
+        """Add the problem of an unsupported name, with the supported ones."""
+        self.say(place, str(UnknownName(f"{what} is not supported", name, choices)))
+
     def text(self, nodes: int | None) -> str:
-        """Return the deployment; what is not here is in `problems`."""
+        """Return the deployment, and fill `problems`."""
         environments = [thing for thing in self.things if thing["category"] == "environment"]
         if len(environments) != 1:
             self.say(self.script, f"a script makes one Environment; this one has made {len(environments)}")
@@ -204,7 +158,7 @@ class Builder:
                 yield thing, f"{name}_{count[name]:03}" if count[name] else name
                 count[name] += 1
 
-    def below(self, parent: int, place: Vector, turned: Quaternion, above: str = "") -> Iterator[tuple[Tree, str, Tree]]:
+    def below(self, parent: int, place: Vector, turned: Quaternion, above: str = "") -> Iterator[Part]:
         """Yield all components on a thing with their names and their places on the robot."""
         for thing, name in self.children(parent):
             x, y, z = (a + b for a, b in zip(place, rotate(turned, thing["location"]), strict=True))
@@ -253,7 +207,7 @@ class Builder:
         x, y, z = thing["scale"]
         entry = self.table["classes"]["objects"][thing["morse"]]
         if entry is None:
-            self.say(thing["place"], f"{thing['morse']}: objects from .blend files are not here")
+            self.say(thing["place"], f"{thing['morse']}: objects from .blend files are not supported")
             return
         ours = name_of(name, {*self.robots, *self.world.get("objects", {})})
         made = {"#": f"{thing['place']}, {thing['morse']}", **entry["fixed"], "tags": []}
@@ -267,44 +221,44 @@ class Builder:
         category, morse = part["category"], part["morse"]
         if category not in ("sensors", "actuators"):
             return {}
-        channel = name_of(label, {*made["sensors"], *made["actuators"], "echo"})
+        channel = name_of(label, {*made["sensors"], *made["actuators"], CHANNEL_ECHO})
         entry: Tree = self.table["classes"][category][morse]
         its: Tree = {"#": f"{part['place']}, {morse}", "kind": "", **({"label": label} if label != channel else {})}
-        values = {**entry.get("defaults", {}), **{key: one for key, (one, _) in part["given"].items()}}
-        rate = entry.get("rate", BASE_HZ)
+        values = {"frequency": entry.get("rate", BASE_HZ), **entry.get("defaults", {})}
+        values |= {key: value for key, (value, _) in part["given"].items()}
         for method, place, args, kwargs in part["calls"]:
-            first = first_of(args, kwargs)
-            if method == "frequency":
-                rate = first
-            elif method == "level":
-                values[LEVEL] = first
+            if method in ("frequency", "level"):
+                values[method] = first_of(args, kwargs)
             elif method == "alter":
-                self.altered(morse, entry, place, first, kwargs, its, f"{robot}.{channel}")
+                self.altered(morse, entry, place, first_of(args, kwargs), kwargs, its, f"{robot}.{channel}")
             else:
                 self.call(part, robot, method, place, args, kwargs)
-        if (level := values.pop(LEVEL, None)) is not None:
-            if level not in (levels := entry.get("levels", {})):
-                self.say(part["place"], str(UnknownName(f"the level of {morse} is not here", level, levels)))
-            entry = {**entry, **levels.get(level, {})}
+        entry = self.levelled(part, entry, values)
         if values.get("resolution"):
             values["rays"] = round(values["scan_window"] / values["resolution"]) + 1
-        its |= {"kind": entry["kind"], **({"rate": rate} if category == "sensors" else {})}
+        self.fastest_hz = max(self.fastest_hz, values["frequency"])
+        its |= {"kind": entry["kind"], **({"rate": values["frequency"]} if category == "sensors" else {})}
         its |= formatted(entry.get("settings", {}), values)
-        self.fastest_hz = max(self.fastest_hz, rate)
-        for key, (_, place) in part["given"].items():
-            if key not in entry.get("defaults", {}) and f"{{{key}}}" not in json.dumps(entry) and key != LEVEL:
-                self.notes.append(f"{place}: the property {key} of {morse} has no effect here.")
-        if "at" in registry.find(category[:-1], entry["kind"]).settings.model_fields:
-            its |= at
-        if "tag" in its:
-            its["tag"] = name_of(its["tag"])
+        its |= at if "at" in registry.find(category[:-1], entry["kind"]).settings.model_fields else {}
+        its |= {"tag": name_of(its["tag"])} if "tag" in its else {}
         if morse in [row.morse for row in ROWS if row.kind == entry["kind"]][1:]:
             self.about["classes"][f"{robot}.{channel}"] = morse
         made |= formatted(entry.get("robot", {}), values)
-        made.setdefault("rules", {}).update(formatted(entry.get("rules", {}), values))
+        made["rules"] = {**made.get("rules", {}), **formatted(entry.get("rules", {}), values)}
         if morse != KEYBOARD or all(one["kind"] != entry["kind"] for one in made["actuators"].values()):
             made[category][channel] = its
         self.has_keyboard |= morse == KEYBOARD
+        return entry
+
+    def levelled(self, part: Tree, entry: Tree, values: Tree) -> Tree:
+        """Return the entry of a component at its level. Properties that it does not have are noted."""
+        level, levels = values.get("level", values.get(LEVEL)), entry.get("levels", {})
+        if level is not None and level not in levels:
+            self.absent(part["place"], f"the level of {part['morse']}", level, levels)
+        entry = {**entry, **levels.get(level, {})}
+        for key in part["given"].keys() - entry.get("defaults", {}).keys() - {LEVEL}:
+            if f"{{{key}}}" not in json.dumps(entry):
+                self.notes.append(f"{part['given'][key][1]}: the property {key} of {part['morse']} has no effect here.")
         return entry
 
     def altered(self, morse: str, entry: Tree, place: str, name: str, about: Tree, its: Tree, full: str) -> None:
@@ -317,14 +271,14 @@ class Builder:
             std = formatted(noise[name], self.table["noise"] | about)
             its.setdefault("modifiers", []).append({"kind": "gaussian_noise", "std": std})
         else:
-            self.say(place, str(UnknownName(f"the modifier of {morse} is not here", name, [*frames, *noise])))
+            self.absent(place, f"the modifier of {morse}", name, [*frames, *noise])
 
     def call(self, thing: Tree, robot: str, method: str, place: str, args: list[Any], kwargs: Tree) -> None:
         """Judge a call of any thing: of a middleware, without an effect, or unknown."""
         if method in MIDDLEWARE:
             middleware, kinds = first_of(args, kwargs, ""), self.table["middlewares"]
             if middleware not in kinds:
-                self.say(place, str(UnknownName("the middleware is not here", middleware, kinds)))
+                self.absent(place, "the middleware", middleware, kinds)
             elif robot:
                 self.served.setdefault(kinds[middleware], {})[robot] = None
             if args[1:] or (args and kwargs):
@@ -332,13 +286,13 @@ class Builder:
         elif method in self.table["ignored"].split():
             self.notes.append(f"{place}: {thing['morse']}.{method} has no effect here.")
         elif method not in self.table["needless"].split():
-            self.say(place, f"{thing['morse']}.{method} is not here")
+            self.say(place, f"{thing['morse']}.{method} is not supported")
 
     def environment(self, thing: Tree) -> None:
         """Add scene, time and place of the world."""
         scene = first_of(thing["args"], thing["kwargs"], "empty")
         if scene not in self.scenes:
-            self.say(thing["place"], str(UnknownName("the scene is not here", scene, self.scenes)))
+            self.absent(thing["place"], "the scene", scene, self.scenes)
         self.world |= self.scenes.get(scene, {})
         given = {"altitude": 0, "angle_against_north": 90, **{key: one for key, (one, _) in thing["given"].items()}}
         self.offsets = {key: given.get(f"UTM{key.upper()}Offset", 0) for key in "xyz"}
@@ -357,7 +311,7 @@ class Builder:
             elif method == "configure_multinode":
                 self.distribution = kwargs.get("distribution", args[3] if args[3:] else {})
                 if kwargs.get("protocol", first) == "hla":
-                    self.say(place, "HLA is not here; nodes exchange frames by foosim's own protocol")
+                    self.say(place, "HLA is not supported; nodes exchange frames by foosim's own protocol")
             elif method == "configure_stream_manager" and kwargs.get("time_sync"):
                 self.sync = {"port": kwargs.get("sync_port", 6000)}
             elif method in self.table["environment"]:
@@ -386,7 +340,7 @@ class Builder:
         every = max(1, round(base_hz / POSES_HZ))
         return {
             "format": 2,
-            "world": name_of(Path(self.script).stem),
+            "world": name_of(self.script.rpartition(".")[0] or self.script),
             "seed": 1,
             "tick": format_ns(tick_ns),
             "substeps": 2,
@@ -419,12 +373,11 @@ class Builder:
         names, found = [*self.robots], {}
         for node, robots in ({} if count else self.distribution).items():
             for robot in [robot for robot in robots if robot not in self.names]:
-                self.say(self.script, str(UnknownName(f"node {node} has an unknown robot", robot, self.names)))
+                self.absent(self.script, f"a robot of node {node}", robot, self.names)
             found[name_of(node, found)] = {"robots": [self.names[robot] for robot in robots if robot in self.names]}
         if not found:
-            parts = [len(names) * part // (count or 1) for part in range((count or 1) + 1)]
-            ranges = zip(parts, parts[1:], strict=False)
-            return {f"n{number}": {"robots": names[a:b]} for number, (a, b) in enumerate(ranges, 1)}
+            ends = [len(names) * part // (count or 1) for part in range((count or 1) + 1)]
+            return {f"n{node}": {"robots": names[a:b]} for node, (a, b) in enumerate(pairwise(ends), 1)}
         given = {robot for node in found.values() for robot in node["robots"]}
         next(iter(found.values()))["robots"] += [name for name in names if name not in given]
         return found
@@ -435,7 +388,9 @@ class Builder:
         for kind, robots in (self.served or {"socket": self.robots}).items():
             found[kind] = {"kind": kind} | ({"robots": [*robots]} if self.served.keys() - {kind} else {})
             for section, about in self.about.items():
-                its = {key: one for key, one in about.items() if "robots" not in found[kind] or key.split(".")[0] in robots}
+                its = {
+                    key: one for key, one in about.items() if "robots" not in found[kind] or key.split(".")[0] in robots
+                }
                 found[kind] |= {section: its} if its else {}
         if self.sync:
             found.setdefault("socket", {"kind": "socket"})["sync"] = {**self.sync, "rate": rate}
