@@ -299,14 +299,14 @@ def _validated(data: Any) -> tuple[Deployment | None, Iterator[Finding]]:
 
 
 def _unused_findings(data: Any, expanded: Expanded) -> Iterator[Finding]:
-    """Yield the errors of unused templates that no further key could mend."""
+    """Yield the errors of unused templates that no further key could mend, nor another entity, as it could a tag."""
     for name, (whole, _) in expanded.unused.items():
         section = next((of for key, of in SECTION_OF_KEY.items() if key in whole.values), None)
         if section is None:
             continue
         deployment, findings = _validated({**data, section: {name: plain(whole)}})
         for finding in chain(findings, () if deployment is None else needs(deployment, Names(()))):
-            if finding.location[:2] == (section, name) and finding.at != "missing":
+            if finding.location[:2] == (section, name) and finding.at != "missing" and finding.location[-1] != "tag":
                 yield replace(finding, location=(TEMPLATES, *finding.location[1:]))
 
 

@@ -31,6 +31,7 @@ RUNS = {
     "yard": ("yard.yaml", 100, []),
     "workshop": ("workshop.yaml", 100, []),
     "eyes": ("eyes.yaml", 10, []),
+    "cat and mouse": ("cat_and_mouse.yaml", 10, []),
 }
 """Deployment, ticks and settings."""
 REHEARSALS = """

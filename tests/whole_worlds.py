@@ -292,6 +292,7 @@ def yard() -> str:
         for n in range(4)
     }
     zone = {"kind": "zone", "at": {"x": "6 m", "y": "6 m"}, "shape": "circle", "radius": "1 m", "tag": "vehicle"}
+    near = {"kind": "catch", "prey": "vehicle", "hunter": "vehicle", "distance": "98 cm"}
     return written(
         {
             "format": 2,
@@ -299,7 +300,7 @@ def yard() -> str:
             "seed": 1,
             "tick": "10 ms",
             "substeps": 4,
-            "rules": {"breeze": {"kind": "wind", "x": "30 cm/s", "z": "10 cm/s"}, "middle": zone},
+            "rules": {"breeze": {"kind": "wind", "x": "30 cm/s", "z": "10 cm/s"}, "middle": zone, "near": near},
             "engine": "mujoco",
             "pace": "fast",
             "assets": "models",

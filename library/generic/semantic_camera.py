@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -17,16 +17,20 @@ from foosim.world.components.in_view import InView
 from foosim.world.components.surroundings import Surroundings
 from foosim.world.components.view import Mounting, View
 from foosim.world.layout import Entity
-from foosim.world.scene import Quaternion, Vector, conjugate, dot, enclosing, moved, multiply, rotate, shape_box
+from foosim.world.scene import Pose, Quaternion, Vector, conjugate, dot, enclosing, moved, multiply, rotate, shape_box
 
 OBJECTS_MAX: Final = 64
 INWARDS: Final = 0.45
 """Of the sides of a box, from its middle to where rays go near its corners: what touches a wall is not hidden by it."""
 CORNERS: Final = [(x, y, z) for x in (-INWARDS, INWARDS) for y in (-INWARDS, INWARDS) for z in (-INWARDS, INWARDS)]
+PROJECTIONS_MAX: Final = 8
+WITHIN: Final = 0.99
+"""Of the view's width and height: rounding takes nothing out of it."""
 
 
 class SemanticCameraSettings(ViewSettings):
-    """Sees entities with the `tag`, by nine rays to the box around each of their links: to its middle and corners.
+    """Sees entities with the `tag`, by nine rays to the box around each of their links: to its middle and corners, and
+    where these are out of view to points of the box in it.
 
     It reports what a ray in its view reaches, with `hidden` also what is in its view behind other things. There are at
     most 64, the nearest first.
@@ -61,7 +65,7 @@ class SemanticCamera(Sensor):
         self._eye, self._settings, self._own = Eye(at, settings), settings, at.robot
         self._in_view, self._around = InView(settings.optics, []), Surroundings(at.spec, at.layout)
         self._targets = [
-            (entity, points_of(self._around, entity))
+            (entity, boxes_of(self._around, entity))
             for entity in self._around.tagged(settings.tag)
             if entity.name in self._around.bodies and entity is not at.robot
         ]
@@ -73,16 +77,15 @@ class SemanticCamera(Sensor):
 
     def sample(self, view: View) -> SeenEntities:
         place, turned = self._eye.pose(view.start)
-        back, near = conjugate(turned), self._settings.near
+        back = conjugate(turned)
         seen: list[SeenEntity] = []
         ways: list[Vector] = []
         owners: list[tuple[int, int]] = []
-        for entity, points in self._targets:
+        for entity, boxes in self._targets:
             if entity.is_absent(view.start):
                 continue
             poses = self._around.poses(view, entity)
-            arms = [moved(moved(poses[n][1], rotate(poses[n][2], point), 1.0), place, -1.0) for n, point in points]
-            inside = [arm for arm in arms if self._in_view.away(its := rotate(back, arm)) <= 0.0 and its[0] >= near]
+            inside = [arm for n, box in boxes for arm in self._in_view_of(box, poses[n], place, turned)]
             if inside:
                 where = rotate(back, moved(poses[0][1], place, -1.0))
                 ways += inside
@@ -96,6 +99,30 @@ class SemanticCamera(Sensor):
             if number in reached or self._settings.hidden
         ]
         return SeenEntities(tuple(sorted(found, key=lambda one: (one.distance, one.name))[:OBJECTS_MAX]))
+
+    def _in_view_of(self, box: LinkBox, link: Pose, place: Vector, turned: Quaternion) -> list[Vector]:
+        """Return the ways from the camera to the points of a link's box, drawn into view (m, world frame).
+
+        A point out of view goes to the nearest of the view and of the box by turns, which leads to both where they meet
+        (Cheney and Goldstein 1959).
+        """
+        its, near, far = self._in_view, self._settings.near, self._settings.far
+        across = multiply(conjugate(link[2]), turned)
+        origin, back = rotate(conjugate(link[2]), moved(place, link[1], -1.0)), conjugate(across)
+        found: list[Vector] = []
+        if its.away(rotate(back, moved(box.points[0], origin, -1.0))) > box.radius:
+            return found
+        for point in box.points:
+            arm = rotate(back, moved(point, origin, -1.0))
+            for _ in range(PROJECTIONS_MAX):
+                if its.away(arm) <= 0.0 and arm[0] >= near:
+                    found.append(rotate(turned, arm))
+                    break
+                x = min(max(arm[0], near), WITHIN * far)
+                wide, high = WITHIN * its.wide * x, WITHIN * its.high * x
+                arm = x, min(max(arm[1], -wide), wide), min(max(arm[2], -high), high)
+                arm = rotate(back, moved(box.nearest(moved(rotate(across, arm), origin, 1.0)), origin, -1.0))
+        return found
 
     def _reached(self, view: View, place: Vector, ways: list[Vector], owners: list[tuple[int, int]]) -> frozenset[int]:
         """Return the numbers of the owners of rays along some ways that meet them first; owners are number and index of
@@ -112,14 +139,30 @@ class SemanticCamera(Sensor):
         )
 
 
-def points_of(around: Surroundings, entity: Entity) -> list[tuple[int, Vector]]:
-    """Return the index of the link and the place in its frame (m) of each point that rays go to."""
-    found: list[tuple[int, Vector]] = []
+class LinkBox(NamedTuple):
+    """The box around a link, in its frame (m), without its outermost part; the points that rays go to, the middle
+    first; and how far the middle is from a corner."""
+
+    low: Vector
+    high: Vector
+    points: list[Vector]
+    radius: float
+
+    def nearest(self, point: Vector) -> Vector:
+        """Return the point of the box that is nearest to a point."""
+        x, y, z = (min(max(at, low), high) for at, low, high in zip(point, self.low, self.high, strict=True))
+        return x, y, z
+
+
+def boxes_of(around: Surroundings, entity: Entity) -> list[tuple[int, LinkBox]]:
+    """Return the index and the box of each link that has shapes."""
+    found: list[tuple[int, LinkBox]] = []
     for index, link in enumerate(around.bodies[entity.name].links):
         if link.shapes:
             low, high = enclosing([shape_box(shape) for shape in link.shapes])
             sides = moved(high, low, -1.0)
             middle = moved(low, sides, 0.5)
             corners = [moved(middle, (x * sides[0], y * sides[1], z * sides[2]), 1.0) for x, y, z in CORNERS]
-            found += [(index, point) for point in (middle, *corners)]
+            radius = INWARDS * sqrt(dot(sides, sides))
+            found.append((index, LinkBox(corners[0], corners[-1], [middle, *corners], radius)))
     return found

@@ -13,7 +13,7 @@ from foosim.deployment.schema import Deployment
 from foosim.simulation.simulation import read_for_stepping
 from tests.components.worlds import DEPLOY
 
-FILES: Final = ("table.yaml", "warehouse.yaml", "yard.yaml", "workshop.yaml", "eyes.yaml")
+FILES: Final = ("table.yaml", "warehouse.yaml", "yard.yaml", "workshop.yaml", "eyes.yaml", "cat_and_mouse.yaml")
 CASES: Final[list[tuple[str, str, dict[str, Any], str]]] = [
     ("table.yaml", "player-red", {"tema": "red"}, "unknown parameter (there are: team), 'tema', nearest is 'team'"),
     ("table.yaml", "player-red", {"team": "green"}, "parameter team is not one of red, blue, 'green'"),
@@ -58,6 +58,8 @@ CASES: Final[list[tuple[str, str, dict[str, Any], str]]] = [
         {"name": "nobody"},
         "porter/gripper takes no jobs from it (there are: foreman), 'nobody'",
     ),
+    ("cat_and_mouse.yaml", "player-cat", {"speed": 1.0}, "a cat has no parameters, "),
+    ("cat_and_mouse.yaml", "player-mouse", {"speed": 1.0}, "a mouse has no parameters, "),
     ("eyes.yaml", "north-driver", {"speed": 1.0}, "a floor seeker has no parameters, "),
     ("workshop.yaml", "foreman", {"speed": 1.0}, "the parameters are name, porter, two cranes, and crates, "),
 ]
