@@ -130,7 +130,7 @@ class Builder:
     def text(self, nodes: int | None) -> str:
         """Return the deployment, and fill `problems`."""
         environments = [thing for thing in self.things if thing["category"] == "environment"]
-        if len(environments) != 1:
+        if len(environments) != 1 and not self.problems:
             self.say(self.script, f"a script makes one Environment; this one has made {len(environments)}")
         for thing in environments[:1]:
             self.environment(thing)
@@ -241,9 +241,12 @@ class Builder:
         its |= formatted(entry.get("settings", {}), values)
         its |= at if "at" in registry.find(category[:-1], entry["kind"]).settings.model_fields else {}
         its |= {"tag": name_of(its["tag"])} if "tag" in its else {}
-        if morse in [row.morse for row in ROWS if row.kind == entry["kind"]][1:]:
-            self.about["classes"][f"{robot}.{channel}"] = morse
+        row = entry.get("row", morse)
+        if row in [one.morse for one in ROWS if one.kind == entry["kind"] and one.only.items() <= its.items()][1:]:
+            self.about["classes"][f"{robot}.{channel}"] = row
         made |= formatted(entry.get("robot", {}), values)
+        for section, its_own in formatted(entry.get("world", {}), values).items():
+            self.world[section] = {**self.world.get(section, {}), **its_own}
         made["rules"] = {**made.get("rules", {}), **formatted(entry.get("rules", {}), values)}
         if morse != KEYBOARD or all(one["kind"] != entry["kind"] for one in made["actuators"].values()):
             made[category][channel] = its
@@ -346,7 +349,7 @@ class Builder:
             "substeps": 2,
             "pace": "fast" if self.is_fixed else self.pace,
             **({} if is_rigid else {"engine": "pure"}),
-            **self.world,
+            **{key: one for key, one in self.world.items() if key != "templates"},
             **self.fleets(),
             "nodes": self.nodes(nodes),
             **({"clients": {"console": {"console": True}}} if self.has_keyboard else {}),
@@ -359,7 +362,7 @@ class Builder:
         alike: dict[str, list[str]] = {}
         for name, robot in self.robots.items():
             alike.setdefault(json.dumps({key: one for key, one in robot.items() if key not in OWN}), []).append(name)
-        templates: Tree = {}
+        templates: Tree = {**self.world.get("templates", {})}
         robots = dict(self.robots)
         for text, names in [(text, names) for text, names in alike.items() if names[1:]]:
             template = name_of(robots[names[0]]["#"].split()[-1], templates)
