@@ -96,6 +96,7 @@ class Foosim(Verbs):
             "down": "cli.control",
             "status": "cli.control",
             "view": "cli.view",
+            "gateway": "cli.gateway",
             **dict.fromkeys(("pause", "resume", "step", "rate", "add", "remove", "push", "set", "move"), "cli.control"),
             **dict.fromkeys(("stop", "start", "balance"), "cli.control"),
         },

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
 from foosim.gateways.rows import Component, Order, Row, label_of, row_of, services_of
-from foosim.world.component_types.settings import ComponentSettings, GatewaySettings
+from foosim.world.component_types.settings import ActuatorSettings, ComponentSettings, GatewaySettings, SensorSettings
 
 RADIO: Final = "radio"
 """The channel of packets between clients on board of robots."""
@@ -39,7 +39,8 @@ def components_of(deployment: Deployment, settings: GatewaySettings) -> dict[str
         its, label = deployment.robots[robot], label_of(deployment, robot)
         if len(settings.robots) > 1:
             found |= {f"{robot}.{one.channel}": one for one in radios(deployment, robot)}
-        for channel, one in (*its.sensors.items(), *its.actuators.items()):
+        parts: dict[str, SensorSettings | ActuatorSettings] = {**its.sensors, **its.actuators}
+        for channel, one in parts.items():
             if one.kind != "job":
                 row = row_of(one, settings.classes.get(f"{robot}.{channel}", ""))
                 name = f"{label}.{one.label or channel}"

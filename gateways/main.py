@@ -50,6 +50,11 @@ class Endpoint:
         rate_hz = run.deployment.clients[self.core.name].rate_hz
         self.core.join(0 if rate_hz is None else run.deployment.ticks(rate_hz), run.heard(robot))
 
+    @property
+    def has_joined(self) -> bool:
+        """Whether it takes part."""
+        return self._gateway is not None
+
     def step(self, now_ns: int) -> None:
         """Hand on what has arrived; a tick that waits continues when the gateway lets it."""
         core, gateway = self.core, self._gateway

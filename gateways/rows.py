@@ -144,6 +144,10 @@ def call(component: Component, service: str, parameters: list[Any]) -> Any:
     return checked(service, partial(its, component), parameters)
 
 
+WRONG_TYPES: Final = (TypeError, ValueError, LookupError, AttributeError)
+"""What functions of services raise for parameters of wrong types."""
+
+
 def checked(service: str, its: Callable[..., Any], parameters: list[Any]) -> Any:
     """Call a function for a service. Raises Refused, with the texts of MORSE's manager."""
     try:
@@ -153,8 +157,13 @@ def checked(service: str, its: Callable[..., Any], parameters: list[Any]) -> Any
         raise Refused(f"{MANAGER}: {what.format(service)} {error}") from None
     try:
         return its(*parameters)
-    except (TypeError, ValueError, LookupError, AttributeError) as error:
-        raise Refused(f"{MANAGER}: wrong parameter type for service {service}. {error}") from None
+    except WRONG_TYPES as error:
+        raise Refused(wrong_type(service, error)) from None
+
+
+def wrong_type(service: str, error: Exception) -> str:
+    """Return MORSE's text for a parameter of a wrong type."""
+    return f"{MANAGER}: wrong parameter type for service {service}. {error}"
 
 
 # --- services of every component -------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from foosim.common.errors import Refused
 from foosim.common.spec_base import Rate, SpecBase
 from foosim.deployment.hosts import Listen
 from foosim.gateways.gateway import Gateway, Peer
-from foosim.gateways.rows import MANAGER, Component, checked
+from foosim.gateways.rows import MANAGER, WRONG_TYPES, Component, checked, wrong_type
 from foosim.gateways.run import Called, Run
 from foosim.gateways.supervision import Supervision
 from foosim.world.component_types.jobs import JobState
@@ -65,6 +65,7 @@ class Socket(Gateway):
         self._readers: dict[str, set[Connection]] = {name: set() for name in run.components}
         self.connections: Final[set[Connection]] = set()
         self.triggers: Final = Triggers(run.proceed)
+        self.service_port = self.sync_port = 0
         self._servers: list[asyncio.Server] = []
         streams: dict[str, Callable[..., Any]] = {
             "list_streams": lambda: sorted(self.ports),
@@ -81,7 +82,7 @@ class Socket(Gateway):
         """Listen. Raises Refused where no port is free."""
         settings, address = self.settings, parse_address(self.settings.listen)
         many = range(address.port, address.port + (SERVICE_PORTS if address.port else 1))
-        where = await self._serve(address.host, many, lambda: Requests(self))
+        self.service_port = await self._serve(address.host, many, partial(Requests, self))
         port = settings.streams
         for name in sorted(self.run.components):
             component = self.run.components[name]
@@ -89,8 +90,9 @@ class Socket(Gateway):
             self.ports[name] = await self._serve(address.host, many, partial(Stream, self, component))
             port = self.ports[name] + 1 if port else 0
         if settings.sync is not None:
-            await self._serve(address.host, range(settings.sync.port, settings.sync.port + 1), lambda: Trigger(self))
-        return f"services at {Address(address.host, where)}, {len(self.ports)} streams"
+            many = range(settings.sync.port, settings.sync.port + 1)
+            self.sync_port = await self._serve(address.host, many, partial(Trigger, self))
+        return f"services at {Address(address.host, self.service_port)}, {len(self.ports)} streams"
 
     async def _serve(self, host: str, ports: range, make: Callable[[], Connection]) -> int:
         """Listen at the first free one of some ports; return it."""
@@ -213,7 +215,7 @@ class Stream(Connection):
 
 
 class Requests(Connection):
-    """The services for one program."""
+    """The services for one program. Jobs continue when it leaves: it may connect again."""
 
     what = "services"
 
@@ -221,10 +223,6 @@ class Requests(Connection):
         super().__init__(gateway)
         self._running: dict[str, Called | asyncio.Task[None]] = {}
         """What takes time, by the id of its request."""
-
-    def connection_lost(self, error: Exception | None) -> None:
-        """Jobs continue: their program may connect again."""
-        super().connection_lost(error)
 
     def received(self, lines: list[bytes]) -> None:
         for line in lines:
@@ -246,7 +244,7 @@ class Requests(Connection):
                 self._answer(identity, "FAILED", str(refused))
                 return
             if inspect.isawaitable(result):
-                self._running[identity] = asyncio.ensure_future(self._await(identity, result))
+                self._running[identity] = asyncio.ensure_future(self._await(identity, service, result))
             elif isinstance(result, Called):
                 if not result.job.state.has_ended:
                     self._running[identity] = result
@@ -266,11 +264,13 @@ class Requests(Connection):
 
         return run.call(run.components[component], service, parameters, ended)
 
-    async def _await(self, identity: str, result: Any) -> None:
+    async def _await(self, identity: str, service: str, result: Any) -> None:
         try:
             outcome = "SUCCESS", await result
         except Refused as refused:
             outcome = "FAILED", str(refused)
+        except WRONG_TYPES as error:
+            outcome = "FAILED", wrong_type(service, error)
         except asyncio.CancelledError:
             outcome = "PREEMPTED", None
         del self._running[identity]
