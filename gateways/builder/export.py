@@ -17,7 +17,8 @@ from foosim.common.errors import UnknownName
 from foosim.common.limits import NAME_LENGTH_MAX
 from foosim.common.names import CHANNEL_ECHO
 from foosim.common.units import NS_PER_S, format_ns, format_rate
-from foosim.gateways.rows import ROWS, euler
+from foosim.gateways.frames import euler
+from foosim.gateways.table import ROWS
 from foosim.world.component_types import registry
 from foosim.world.scene import Quaternion, Vector, from_rpy, multiply, rotate
 
@@ -103,10 +104,10 @@ class Builder:
     def __init__(self, script: str, recorded: Tree) -> None:
         """`script` is the name of the file."""
         self.script, self.things = script, recorded["things"]
-        self.problems: Final = [f"{place}: {text}" for place, text in recorded["problems"]]
+        self.problems = [f"{place}: {text}" for place, text in recorded["problems"]]
         self.notes: Final[list[str]] = []
         self.table, self.scenes, self.classes = data("components.yaml"), data("scenes.yaml"), data("robots.yaml")
-        self.world: Final[Tree] = {}
+        self.world: Tree = {}
         self.robots: Final[dict[str, Tree]] = {}
         self.names: Final[dict[str, str]] = {}
         """The names of robots here, by those of MORSE."""
@@ -373,7 +374,8 @@ class Builder:
 
     def nodes(self, count: int | None) -> Tree:
         """Return the nodes with their robots."""
-        names, found = [*self.robots], {}
+        names = [*self.robots]
+        found: Tree = {}
         for node, robots in ({} if count else self.distribution).items():
             for robot in [robot for robot in robots if robot not in self.names]:
                 self.absent(self.script, f"a robot of node {node}", robot, self.names)
@@ -388,7 +390,7 @@ class Builder:
     def gateways(self, rate: str) -> Tree:
         """Return the gateways; without any middleware MORSE has its socket."""
         found: Tree = {}
-        for kind, robots in (self.served or {"socket": self.robots}).items():
+        for kind, robots in (self.served or {"socket": {}}).items():
             found[kind] = {"kind": kind} | ({"robots": [*robots]} if self.served.keys() - {kind} else {})
             for section, about in self.about.items():
                 its = {

@@ -31,6 +31,8 @@ class Thing:
     made: ClassVar[list[Thing]] = []
     morse: ClassVar = ""
     category: ClassVar = ""
+    location: list[float]
+    rotation_euler: list[float]
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         its = self.__dict__
@@ -127,7 +129,8 @@ def install(classes: dict[str, list[str]]) -> None:
 def main() -> None:
     """Run a script and write what it has made. A process that the script forks writes nothing."""
     script, classes, result = (Path(word).resolve() for word in sys.argv[1:4])
-    limit_s, owner, problems = int(sys.argv[4]), os.getpid(), []
+    limit_s, owner = int(sys.argv[4]), os.getpid()
+    problems: list[tuple[str, str]] = []
     sys.path.insert(0, str(script.parent))
     os.chdir(script.parent)
     install(json.loads(classes.read_text()))

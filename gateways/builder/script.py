@@ -46,7 +46,7 @@ def record(script: Path, limit_s: int) -> Tree:
     with TemporaryDirectory() as folder:
         known, result = Path(folder, "classes.json"), Path(folder, "result.json")
         known.write_text(json.dumps({category: [*morses] for category, morses in classes.items()}))
-        command = [sys.executable, "-I", "-m", f"{MODULE}.record", script, known, result, str(limit_s)]
+        command = [sys.executable, "-I", "-m", f"{MODULE}.record", *map(str, (script, known, result, limit_s))]
         with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=2, start_new_session=True) as child:
             with suppress(subprocess.TimeoutExpired):
                 child.wait(limit_s + GRACE_S)
