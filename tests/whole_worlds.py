@@ -68,6 +68,28 @@ MEASURED: Final = ("accelerometer", "clock", "motion_state", "satellite_fix", "t
 OF_JUMPER: Final[dict[str, Any]] = {kind: {"kind": kind, "rate": "50 Hz"} for kind in MEASURED} | {
     "touch": {"kind": "collision", "rate": "50 Hz", "at": {"z": "20 cm"}, "reach": "9 m"}
 }
+OF_GOER: Final = {"jobs": {"kind": "job", "actuator": "go", "rate": "20 Hz"}}
+GOERS: Final[dict[str, Any]] = {
+    "roamer": {
+        "model": "holonomic",
+        "at": {"x": "-4 m", "y": "-5 m"},
+        "actuators": {"go": {"kind": "go_within"}},
+        "sensors": OF_GOER,
+    },
+    "hawk": {
+        "model": "rotorcraft",
+        "at": {"x": "-3 m", "y": "-5 m"},
+        "actuators": {"go": {"kind": "fly_within"}},
+        "sensors": OF_GOER,
+    },
+    "jumper": {
+        "model": "holonomic",
+        "at": {"x": "-5 m", "y": "-5 m"},
+        "actuators": {"motion": {"kind": "x_y_w"}, "jump": {"kind": "teleport"}},
+        "sensors": OF_JUMPER,
+    },
+}
+"""Robots by places that they are to come to, or are put at."""
 OF_COMMANDS: Final[dict[str, list[dict[str, Any]]]] = {
     "rover-1": [
         {"kind": "gaussian_noise", "std": "10 mm/s"},
@@ -129,24 +151,7 @@ def mixed() -> str:
         "tug": {"model": "differential_drive", "at": {"x": "-5 m", "y": "-3 m"}, "tags": ["guest"]},
         "omni": {"model": "holonomic", "at": {"x": "-4 m", "y": "-3 m"}},
         "craft": {"model": "rotorcraft", "at": {"x": "-3 m", "y": "-3 m"}},
-        "roamer": {
-            "model": "holonomic",
-            "at": {"x": "-4 m", "y": "-5 m"},
-            "actuators": {"go": {"kind": "go_within"}},
-            "sensors": {"jobs": {"kind": "job", "actuator": "go", "rate": "20 Hz"}},
-        },
-        "hawk": {
-            "model": "rotorcraft",
-            "at": {"x": "-3 m", "y": "-5 m"},
-            "actuators": {"go": {"kind": "fly_within"}},
-            "sensors": {"jobs": {"kind": "job", "actuator": "go", "rate": "20 Hz"}},
-        },
-        "jumper": {
-            "model": "holonomic",
-            "at": {"x": "-5 m", "y": "-5 m"},
-            "actuators": {"motion": {"kind": "x_y_w"}, "jump": {"kind": "teleport"}},
-            "sensors": OF_JUMPER,
-        },
+        **GOERS,
         "walker": {"model": "mover", "shape": "sphere", "radius": "30 cm", "path": WALK, "speed": "1 m/s"},
     }
     for robot in ("tug", "omni", "craft"):

@@ -1,4 +1,4 @@
-"""Robots put somewhere at once, as their actuators `teleport` were told."""
+"""Robots put at once where commands of their actuators `teleport` have them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MODELS = ("differential_drive", "holonomic", "rotorcraft")
 
 
 class TeleportedSettings(RuleSettings):
-    """Puts each robot that has an actuator of the kind `teleport` where that was told, whatever is there."""
+    """Puts robots at once at the poses of their actuators of the kind `teleport`, whatever is there."""
 
 
 @rule("teleported", TeleportedSettings, each={ROBOTS: {"done": 1}}, writes=MODELS)
