@@ -9,8 +9,7 @@ from __future__ import annotations
 import asyncio
 import inspect
 import json
-import socket as sockets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Annotated, Any, Final
 
@@ -20,7 +19,7 @@ from foosim.common.addresses import Address, parse_address
 from foosim.common.errors import Refused
 from foosim.common.spec_base import Rate, SpecBase
 from foosim.deployment.hosts import Listen
-from foosim.gateways.gateway import Gateway, Peer
+from foosim.gateways.lines import Connection, LineServer
 from foosim.gateways.rows import MANAGER, WRONG_TYPES, Component, checked, wrong_type
 from foosim.gateways.run import Called, Run
 from foosim.gateways.supervision import Supervision
@@ -30,9 +29,6 @@ from foosim.world.component_types.settings import GatewaySettings
 
 SERVICE_PORTS: Final = 10
 """Ports for services that are tried in turn."""
-LINE_BYTES_MAX: Final = 1 << 20
-UNREAD_BYTES_MAX: Final = 1 << 16
-"""A reader that has more than this to read misses messages."""
 DATASTREAM: Final = "morse.middleware.socket_datastream.SocketDatastreamManager"
 Port = Annotated[int, Field(ge=0, le=65_535)]
 
@@ -55,18 +51,16 @@ class SocketSettings(GatewaySettings):
 
 
 @gateway("socket", SocketSettings)
-class Socket(Gateway):
+class Socket(LineServer):
     """Streams and services as of MORSE's socket interface."""
 
     def __init__(self, settings: SocketSettings, run: Run, supervision: Supervision) -> None:
         super().__init__(settings, run, supervision)
         self.ports: Final[dict[str, int]] = {}
         """The port of the stream of each component, by name."""
-        self._readers: dict[str, set[Connection]] = {name: set() for name in run.components}
-        self.connections: Final[set[Connection]] = set()
+        self._readers: dict[str, set[Stream]] = {name: set() for name in run.components}
         self.triggers: Final = Triggers(run.proceed)
         self.service_port = self.sync_port = 0
-        self._servers: list[asyncio.Server] = []
         streams: dict[str, Callable[..., Any]] = {
             "list_streams": lambda: sorted(self.ports),
             "get_stream_port": self._stream_port,
@@ -82,40 +76,17 @@ class Socket(Gateway):
         """Listen. Raises Refused where no port is free."""
         settings, address = self.settings, parse_address(self.settings.listen)
         many = range(address.port, address.port + (SERVICE_PORTS if address.port else 1))
-        self.service_port = await self._serve(address.host, many, partial(Requests, self))
+        self.service_port = await self.listen(address.host, many, partial(Requests, self))
         port = settings.streams
         for name in sorted(self.run.components):
             component = self.run.components[name]
             many = range(port, 65_536) if port else range(1)
-            self.ports[name] = await self._serve(address.host, many, partial(Stream, self, component))
+            self.ports[name] = await self.listen(address.host, many, partial(Stream, self, component))
             port = self.ports[name] + 1 if port else 0
         if settings.sync is not None:
             many = range(settings.sync.port, settings.sync.port + 1)
-            self.sync_port = await self._serve(address.host, many, partial(Trigger, self))
+            self.sync_port = await self.listen(address.host, many, partial(Trigger, self))
         return f"services at {Address(address.host, self.service_port)}, {len(self.ports)} streams"
-
-    async def _serve(self, host: str, ports: range, make: Callable[[], Connection]) -> int:
-        """Listen at the first free one of some ports; return it."""
-        family = sockets.AF_INET6 if ":" in host else sockets.AF_INET
-        for port in ports:
-            listener = sockets.socket(family)
-            listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)
-            try:
-                listener.bind((host, port))
-            except OSError as error:
-                listener.close()
-                why = error.strerror
-                continue
-            self._servers.append(await asyncio.get_running_loop().create_server(make, sock=listener, backlog=1024))
-            return int(listener.getsockname()[1])
-        raise Refused(f"{self.run.name}: no port from {ports[0]} to {ports[-1]} of {host} can be listened at: {why}")
-
-    async def close(self) -> None:
-        """Close all connections, after what is written."""
-        for server in self._servers:
-            server.close()
-        for connection in [*self.connections]:
-            connection.transport.close()
 
     def arrived(self, component: Component) -> None:
         readers = self._readers[component.full]
@@ -125,15 +96,12 @@ class Socket(Gateway):
             for reader in readers:
                 reader.offer(line)
 
-    def readers(self, component: Component) -> set[Connection]:
+    def readers(self, component: Component) -> set[Stream]:
         """Return the connections that read the stream of a sensor."""
         return self._readers[component.full]
 
     def go(self) -> bool:
         return self.triggers.go()
-
-    def peers(self) -> Iterator[Peer]:
-        yield from (Peer(one.peer, one.what, one.count) for one in self.connections)
 
     def _stream_port(self, name: str) -> int:
         if name not in self.ports:
@@ -141,46 +109,7 @@ class Socket(Gateway):
         return self.ports[name]
 
 
-class Connection(asyncio.Protocol):
-    """A connection that reads lines. One with a longer line than `LINE_BYTES_MAX` is closed."""
-
-    what = ""
-    """What it is connected to."""
-    transport: asyncio.Transport
-
-    def __init__(self, gateway: Socket) -> None:
-        self._gateway, self.peer, self.count, self._rest = gateway, "", 0, b""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self.transport = transport
-        host, port, *_ = transport.get_extra_info("peername")
-        self.peer = str(Address(host, port))
-        self._gateway.connections.add(self)
-
-    def connection_lost(self, error: Exception | None) -> None:
-        self._gateway.connections.discard(self)
-
-    def data_received(self, data: bytes) -> None:
-        *lines, self._rest = (self._rest + data).split(b"\n")
-        if lines:
-            self.count += len(lines)
-            self.received(lines)
-        if len(self._rest) > LINE_BYTES_MAX:
-            self._gateway.log.warning("%s sends a line of more than %d bytes: it is closed", self.peer, LINE_BYTES_MAX)
-            self.transport.close()
-
-    def received(self, lines: list[bytes]) -> None:
-        """Take whole lines."""
-
-    def offer(self, line: bytes) -> None:
-        """Write a line, unless the reader is too slow for it."""
-        if self.transport.get_write_buffer_size() <= UNREAD_BYTES_MAX:
-            self.transport.write(line)
-            self.count += 1
-
-
-class Stream(Connection):
+class Stream(Connection[Socket]):
     """The stream of a component: to readers of a sensor, from writers of an actuator.
 
     Of the lines that a writer has sent at once, the last one counts.
@@ -214,7 +143,7 @@ class Stream(Connection):
                 self._gateway.log.warning("%s of %s: %s", self.what, self.peer, error)
 
 
-class Requests(Connection):
+class Requests(Connection[Socket]):
     """The services for one program. Jobs continue when it leaves: it may connect again."""
 
     what = "services"
@@ -285,7 +214,7 @@ class Requests(Connection):
 
     def _answer(self, identity: str, status: str, result: Any) -> None:
         text = f" {json.dumps(result)}" if result else ""  # MORSE leaves out what is false
-        self.transport.write(f"{identity} {status}{text}\n".encode())
+        self.answer(f"{identity} {status}{text}\n".encode())
 
 
 def parameters_of(text: str) -> list[Any]:
@@ -329,7 +258,7 @@ class Triggers:
         self._proceed()
 
 
-class Trigger(Connection):
+class Trigger(Connection[Socket]):
     """A program that triggers steps."""
 
     what = "steps"

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from foosim.gateways.socket import LINE_BYTES_MAX, UNREAD_BYTES_MAX, Socket
+from foosim.gateways.lines import LINE_BYTES_MAX, UNREAD_BYTES_MAX
+from foosim.gateways.socket import Socket
 from tests.gateways.serving import Served, Wire
 
 TEXT = """
