@@ -122,3 +122,15 @@ LAG_ANCHOR_NS: Final = 100_000_000
 """A lag above this moves the wall anchor; less is caught up."""
 JOURNAL_BYTES_MAX: Final = 64 * 1024 * 1024
 CAPTURE_QUEUE_ROWS_MAX: Final = 200_000
+YARP_MESSAGE_BYTES_MAX: Final = 256 * 1024
+"""One message to a port of YARP; what a port sends, such as a picture, has no limit of its own."""
+YARP_LINE_BYTES_MAX: Final = 64 * 1024
+"""One line to a port or name server of YARP."""
+YARP_DEPTH_MAX: Final = 32
+"""Lists in lists of a bottle."""
+YARP_BEHIND_BYTES_MAX: Final = 64 * 1024
+"""Bytes that wait for a reader of a port before messages to it are dropped."""
+YARP_BEHIND_MESSAGES_MAX: Final = 64
+"""Messages that a reader of a port has not acknowledged before further ones are dropped."""
+YARP_NAMES_MAX: Final = 65_536
+"""Ports at the name server that a gateway starts."""

@@ -24,6 +24,8 @@ from foosim.gateways.rows import Component, Effect, Fields, Order, call, command
 from foosim.protocol.messages import Received
 from foosim.world.component_types.jobs import JobState
 
+MEASURED: Final = "measured"
+"""The channel of packets to the gateway's own client with what real sensors have measured."""
 Send = Callable[[str, Packet], None]
 """Sends a packet of the client with a name."""
 
@@ -160,6 +162,11 @@ class Run:
             raise Refused(f"{component.full}: no robot {to!r} has a radio here (valid are: {', '.join(self.robots)})")
         packet = Packet(self.clients[self.robots[to]], RADIO, encode_json(fields["data"]))
         self._send(self.clients[component.robot], packet)
+
+    def measured(self, component: Component, fields: Fields) -> None:
+        """Enter what a real sensor in place of this one has measured into the capture, by its row's fields."""
+        data = {"sensor": f"{component.robot}.{component.channel}", **fields}
+        self._send(self.clients[component.robot], Packet(self.clients[""], MEASURED, encode_json(data)))
 
     def call(
         self, component: Component, service: str, parameters: list[Any], ended: Callable[[Called], None]
