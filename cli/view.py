@@ -114,8 +114,8 @@ def open_run_sources(
         return join(f"run:{name}", endpoint, timeout_s=JOIN_S, pki=pki_of(info))
 
     folder = open_run(name)
-    operate, join = (None, None) if view_only else (operating, joining)
-    live = LiveSource(name, viewing, operate, partial(how_ended, folder), join, folder.gateways)
+    operate, giving = (None, None) if view_only else (operating, joining)
+    live = LiveSource(name, viewing, operate, partial(how_ended, folder), giving, folder.gateways)
     return [live] if second is None else _followed_live(live, name, second, offset_ns)
 
 
