@@ -20,7 +20,7 @@ SESSIONS: Final[dict[str, list[tuple[str, str]]]] = json.loads((HERE / "yarp_ses
 """Recorded between programs of YARP 3.5: who sent (c the one that connected) and what, by a name of the session."""
 PROGRAMS: Final = Path(os.environ.get("FOOSIM_YARP", HERE.parents[1] / ".yarp" / "build" / "bin"))
 """Where `make yarp` builds them."""
-WAIT_S: Final = 30.0
+WAIT_S: Final = 20.0
 
 
 class Rig(AsyncExitStack):
