@@ -6,7 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from foosim.deployment.schema import Deployment
-from foosim.gateways.rows import Component, Order, Row, label_of, row_of, services_of
+from foosim.gateways.frames import alterations
+from foosim.gateways.rows import Component, Order, Row, label_of, services_of
+from foosim.gateways.table import row_of
 from foosim.world.component_types.settings import ActuatorSettings, ComponentSettings, GatewaySettings, SensorSettings
 
 RADIO: Final = "radio"
@@ -32,7 +34,7 @@ def radios(deployment: Deployment, robot: str) -> Iterator[Component]:
 def components_of(deployment: Deployment, settings: GatewaySettings) -> dict[str, Component]:
     """Return the components of the robots that a gateway serves, by their names in the deployment, `ROBOT.CHANNEL`.
 
-    Raises UnknownName for a class that one of them does not have.
+    Raises BadValue for a class that one of them does not have, and frames in which it cannot be given.
     """
     found: dict[str, Component] = {}
     for robot in settings.robots:
@@ -42,9 +44,10 @@ def components_of(deployment: Deployment, settings: GatewaySettings) -> dict[str
         parts: dict[str, SensorSettings | ActuatorSettings] = {**its.sensors, **its.actuators}
         for channel, one in parts.items():
             if one.kind != "job":
-                row = row_of(one, settings.classes.get(f"{robot}.{channel}", ""))
-                name = f"{label}.{one.label or channel}"
-                found[f"{robot}.{channel}"] = Component(name, robot, channel, one, deployment, row)
+                key, name = f"{robot}.{channel}", f"{label}.{one.label or channel}"
+                row = row_of(one, settings.classes.get(key, ""))
+                frames = alterations(settings.alter.get(key, ()), row.morse, deployment.origin)
+                found[key] = Component(name, robot, channel, one, deployment, row, beside=found, alterations=frames)
     return found
 
 

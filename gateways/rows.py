@@ -1,8 +1,8 @@
-"""The table of rows: which component type is which class of MORSE, with fields, conventions and services.
+"""Rows: which component type is which class of MORSE, with fields, conventions and services. rows.yaml and table.py
+have them.
 
-All gateways share it. A row is pure functions of values: `out` makes the fields of a reading, in the order of a bottle
-and without the timestamp; `into` makes the numbers of a command from such fields. A component type without a row of its
-own gets one by its payload: the fields are those of its reading or command.
+All gateways share them. A row is pure functions of values: `out` makes the fields of a reading, without the timestamp;
+`into` makes the numbers of a command from such fields.
 
 Lengths are in m, angles in rad, times in s. The world is x east, y north, z up; `yaw`, `pitch`, `roll` are the turns
 R = Rz(yaw) Ry(pitch) Rx(roll).
@@ -11,7 +11,7 @@ R = Rz(yaw) Ry(pitch) Rx(roll).
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
@@ -20,12 +20,9 @@ from typing import Any, Final
 import msgspec
 
 from foosim.common.errors import Refused, UnknownName
-from foosim.common.exact_math import asin, atan2
 from foosim.deployment.schema import Deployment
-from foosim.world.component_types.payloads import as_float
-from foosim.world.component_types.per_field import codec_of
-from foosim.world.component_types.settings import ComponentSettings, SensorSettings
-from foosim.world.scene import Quaternion, multiply
+from foosim.gateways.frames import Alteration
+from foosim.world.component_types.settings import ComponentSettings
 
 MANAGER: Final = "Socket service manager"
 """Begins the texts of failed services, also in other protocols: clients look for `wrong # of parameters`."""
@@ -40,6 +37,8 @@ class Effect(Enum):
     """The service is answered when the command is sent."""
     JOB = "job"
     """It is answered when the job ends: `SUCCESS` with the answer, FAILED with the reason, or PREEMPTED."""
+    START = "start"
+    """A job begins, and the service is answered at once."""
     PAUSE = "pause"
     """As a command; the running job is not answered."""
     RESUME = "resume"
@@ -53,6 +52,8 @@ class Order:
     fields: Fields
     answer: Any = None
     effect: Effect = Effect.COMMAND
+    numbers: Fields | None = None
+    """The numbers of the actuator's command, where they do not follow from the fields."""
 
 
 Service = Callable[..., Any]
@@ -68,11 +69,16 @@ class Row:
     morse: str
     fields: tuple[str, ...]
     """In the order of a bottle; of a reading without the timestamp, which is before them."""
-    out: Callable[[Any, Component], Fields] | None = None
+    out: Callable[[Any, Component], Fields | None] | None = None
+    """None: this reading is not sent on."""
     into: Callable[[Fields, Component], Fields] | None = None
     services: Mapping[str, Service] = field(default_factory=dict)
     defaults: Mapping[str, Any] = field(default_factory=dict)
     """Fields that a first command may be without."""
+    only: Mapping[str, Any] = field(default_factory=dict)
+    """The values of settings with which it applies."""
+    joints: bool = False
+    """Its fields are the names of the joints, where the component's settings have them."""
 
 
 @dataclass(slots=True, eq=False)
@@ -92,6 +98,10 @@ class Component:
     """When that was sent, in simulated time."""
     count: int = 0
     """How many readings have come, or commands were sent."""
+    alterations: Sequence[Alteration] = ()
+    """The frames of reference in which its fields are given."""
+    beside: Mapping[str, Component] = field(default_factory=dict)
+    """The components of the gateway by `ROBOT.CHANNEL`."""
     status: str = "Stop"
     """Of an actuator with jobs: `Transit` while one runs, `Arrived` when it is done, else `Stop`."""
 
@@ -101,19 +111,24 @@ class Component:
         return self.row.out is not None
 
 
-def row_of(settings: ComponentSettings, morse: str = "") -> Row:
-    """Return the row of a component type: of several the class `morse`, or the first one. Raises UnknownName."""
-    is_out = isinstance(settings, SensorSettings)
-    found = [row for row in ROWS if row.kind == settings.kind and (row.out is not None) is is_out]
-    found = found or [_plain(settings)]
-    for row in found:
-        if morse in ("", row.morse):
-            return row
-    raise UnknownName(f"{settings.kind} has no row of the class", morse, [row.morse for row in found])
+def reading(component: Component, value: Any, time_ns: int) -> Fields | None:
+    """Return the fields of a reading that was sent at a time (ns); None: it is not sent on.
+
+    The component has the fields of the reading before, as it was sent on, until the caller replaces them.
+    """
+    assert component.row.out is not None, f"{component.full} is no sensor"
+    component.time_ns = time_ns
+    fields = component.row.out(value, component)
+    if fields is None:
+        return None
+    fields = {name: fields[name] for name in component.row.fields}
+    for one in component.alterations:
+        fields = one.apply(fields, one.leaving)
+    return fields
 
 
-def command(component: Component, given: Mapping[str, Any]) -> tuple[Fields, Fields]:
-    """Return the fields of a whole command and the numbers of the actuator's command.
+def command(component: Component, given: Mapping[str, Any], numbers: Fields | None = None) -> tuple[Fields, Fields]:
+    """Return the fields of a whole command and the numbers of the actuator's command, if these are not given.
 
     Other fields keep the values of the last command. Raises Refused for unknown, missing and wrong fields.
     """
@@ -123,11 +138,16 @@ def command(component: Component, given: Mapping[str, Any]) -> tuple[Fields, Fie
     if unknown := [name for name in given if name not in row.fields]:
         raise UnknownName(f"{component.full} takes {', '.join(row.fields)}: no such field", unknown[0], row.fields)
     whole = {**row.defaults, **(component.fields or {}), **given}
-    if missing := [name for name in row.fields if name not in whole]:
+    if missing := [name for name in row.fields if name not in whole and not row.joints]:
         raise Refused(f"{component.full} takes {', '.join(row.fields)}: {', '.join(missing)} missing")
+    if numbers is not None:
+        return whole, numbers
     try:
-        return whole, row.into(whole, component)
-    except (TypeError, ValueError, LookupError, AttributeError) as error:
+        fields = whole
+        for one in component.alterations:
+            fields = one.apply(fields, one.coming)
+        return whole, row.into(fields, component)
+    except WRONG_TYPES as error:
         raise Refused(f"{component.full} takes {', '.join(row.fields)} as numbers: {error}") from None
 
 
@@ -208,111 +228,7 @@ COMMON: Final[dict[str, Service]] = {
 READING: Final[dict[str, Service]] = {"get_local_data": _local_data}
 
 
-# --- conventions -----------------------------------------------------------------------------------------------------
-
-
-def euler(orientation: Quaternion) -> tuple[float, float, float]:
-    """Return yaw, pitch and roll of an orientation."""
-    x, y, z, w = orientation
-    pitch = asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
-    yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return yaw, pitch, atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-
-
-def quaternion(orientation: Quaternion) -> Fields:
-    """Return an orientation as MORSE writes it."""
-    return dict(zip("xyzw", orientation, strict=True))
-
-
-CAMERA: Final[Quaternion] = (0.5, -0.5, 0.5, 0.5)
-"""From the axes of a camera here (x ahead, y left, z up) to those of MORSE's cameras (x right, y down, z ahead)."""
-
-POSE: Final = ("x", "y", "z", "yaw", "pitch", "roll")
-
-
-def _pose(value: Any, component: Component) -> Fields:
-    angles = euler((value.qx, value.qy, value.qz, value.qw))
-    return dict(zip(POSE, (value.x, value.y, value.z, *angles), strict=True))
-
-
-def _level_pose(value: Any, component: Component) -> Fields:
-    return dict(zip(POSE, (value.x, value.y, 0.0, value.heading, 0.0, 0.0), strict=True))
-
-
-def _seen(value: Any, component: Component) -> Fields:
-    seen = [
-        {
-            "name": label_of(component.deployment, one.name),
-            "description": "",
-            "type": getattr(component.settings, "tag", ""),
-            "position": [-one.position[1], -one.position[2], one.position[0]],
-            "orientation": quaternion(multiply(CAMERA, one.orientation)),
-        }
-        for one in value.objects
-    ]
-    return {"visible_objects": seen}
-
-
 def label_of(deployment: Deployment, entity: str) -> str:
     """Return the label of an entity, its name if it has none."""
     its = deployment.settings_of(entity)
     return getattr(its, "label", None) or entity
-
-
-# --- the table -------------------------------------------------------------------------------------------------------
-
-
-def _goto(component: Component, x: float, y: float, z: float, tolerance: float = 0.5, speed: float = 1.0) -> Order:
-    return Order(_place(x, y, z, tolerance, speed), "Arrived", Effect.JOB)
-
-
-def _set_destination(
-    component: Component, x: float, y: float, z: float, tolerance: float = 0.5, speed: float = 1.0
-) -> Order:
-    return Order(_place(x, y, z, tolerance, speed), True)
-
-
-def _place(x: float, y: float, z: float, tolerance: float, speed: float) -> Fields:
-    numbers = (as_float(one) for one in (x, y, z, tolerance, speed))
-    return dict(zip(("x", "y", "z", "tolerance", "speed"), numbers, strict=True))
-
-
-def _plain(settings: ComponentSettings) -> Row:
-    """Return the row of a component type outside of the table: its fields are those of its reading or command."""
-    codec = codec_of(settings.component_type)
-    names = tuple(one.name for one in codec.fields if not (codec.has_job and one.name == "job"))
-    if isinstance(settings, SensorSettings):
-        return Row(settings.kind, settings.kind, names, out=lambda value, _: msgspec.to_builtins(value))
-    return Row(settings.kind, settings.kind, names, into=lambda fields, _: dict(fields))
-
-
-ROWS: Final = (
-    Row("pose_3d", "Pose", POSE, out=_pose),
-    Row("pose", "Pose", POSE, out=_level_pose),
-    Row("semantic_camera", "SemanticCamera", ("visible_objects",), out=_seen),
-    Row(
-        "v_w",
-        "MotionVW",
-        ("v", "w"),
-        into=lambda fields, _: {"linear": as_float(fields["v"]), "angular": as_float(fields["w"])},
-        services={
-            "set_speed": lambda component, v, w: Order({"v": as_float(v), "w": as_float(w)}),
-            "stop": lambda component: Order({"v": 0.0, "w": 0.0}),
-        },
-        defaults={"v": 0.0, "w": 0.0},
-    ),
-    Row(
-        "go_to",
-        "Waypoint",
-        ("x", "y", "z", "tolerance", "speed"),
-        into=lambda fields, _: {"x": as_float(fields["x"]), "y": as_float(fields["y"])},
-        services={
-            "setdest": _set_destination,
-            "goto": _goto,
-            "stop": lambda component: Order({"speed": 0.0}, "Stop", Effect.PAUSE),
-            "resume": lambda component: Order({}, "Transit", Effect.RESUME),
-            "get_status": lambda component: component.status,
-        },
-        defaults={"z": 0.0, "tolerance": 0.5, "speed": 1.0},
-    ),
-)

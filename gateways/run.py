@@ -20,7 +20,7 @@ from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.channel_kinds import channels_of
 from foosim.deployment.schema import Deployment
 from foosim.gateways.components import RADIO, RECEIVED, components_of
-from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, label_of
+from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, label_of, reading
 from foosim.protocol.messages import Received
 from foosim.world.component_types.jobs import JobState
 
@@ -30,7 +30,7 @@ Send = Callable[[str, Packet], None]
 """Sends a packet of the client with a name."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Called:
     """A service that takes time; when its job has ended `ended` is called. `answer` is that of one that is done."""
 
@@ -80,6 +80,8 @@ class Run:
         self._reports = Newest({pair: its for pair, its in self._channels.items() if pair not in self._by_channel})
         self._jobs: dict[str, Jobs] = {}
         self._called: list[Called] = []
+        self._paused: dict[str, tuple[Fields, list[Called]]] = {}
+        """By component the fields before it was paused, and the services that wait."""
         self._encoder, self._send, self._log = CommandEncoder(deployment), send, logging.getLogger(name)
 
     @property
@@ -113,13 +115,15 @@ class Run:
 
     def _measured(self, component: Component, packet: Received) -> None:
         codec, _ = self._channels[packet.source, packet.channel]
-        assert codec is not None and component.row.out is not None, "sensors have a codec"
+        assert codec is not None, "sensors have a codec"
         try:
             value = codec.decode(packet.payload)
         except Malformed as malformed:
             self._log.warning("%s: %s", component.full, malformed)
             return
-        self._deliver(component, component.row.out(value, component), packet)
+        fields = reading(component, value, packet.sent_ns)
+        if fields is not None:
+            self._deliver(component, fields, packet)
 
     def _received(self, robot: str, packet: Received) -> None:
         sender = next((robot for robot, client in self.clients.items() if client == packet.source), "")
@@ -174,19 +178,41 @@ class Run:
         result = call(component, service, parameters)
         if not isinstance(result, Order):
             return result
-        if result.effect is not Effect.JOB:
+        if result.effect is Effect.JOB:
+            return self._begin(component, result, ended)
+        if result.effect is Effect.START:
+            self._begin(component, result, lambda called: None)
+        elif result.effect is Effect.RESUME:
+            self._resume(component)
+        else:
+            if result.effect is Effect.PAUSE and component.full not in self._paused:
+                its = [called for called in self._called if called.component is component]
+                self._called = [called for called in self._called if called.component is not component]
+                self._paused[component.full] = component.fields or {}, its
+                component.status = "Stop"
             self.command(component, result.fields)
-            return result.answer
-        return self._begin(component, result, ended)
+        return result.answer
+
+    def _resume(self, component: Component) -> None:
+        """Give a command again that was paused, and its job."""
+        fields, its = self._paused.pop(component.full, ({}, []))
+        if not its:
+            self.command(component, fields)
+        for called in its[-1:]:
+            again = self._begin(component, Order(fields), called.ended)
+            called.job = again.job
+            self._called[-1:] = [called]
+        self._called = [*its[:-1], *self._called]
 
     def _begin(self, component: Component, order: Order, ended: Callable[[Called], None]) -> Called:
-        fields, numbers = command(component, order.fields)
+        fields, numbers = command(component, order.fields, order.numbers)
         client = self.clients[component.robot]
         jobs = self._jobs.get(component.full)
         if jobs is None:
             jobs = self._jobs[component.full] = Jobs(self.deployment, client, component.robot, component.channel)
             jobs.hear(self._reports.samples)
-        component.fields = fields
+        component.fields, component.status = fields, "Transit"
+        self._called += self._paused.pop(component.full, ({}, []))[1]
         called = Called(component, jobs.call(**numbers), order.answer, ended)
         self._called.append(called)
         self._look_at_jobs()
@@ -194,6 +220,7 @@ class Run:
 
     def cancel(self, called: Called) -> None:
         """Call a service off that takes time."""
+        self._called += self._paused.pop(called.component.full, ({}, []))[1]
         called.job.cancel()
         self._look_at_jobs()
 
@@ -208,6 +235,7 @@ class Run:
         over = [called for called in self._called if called.job.state.has_ended]
         self._called = [called for called in self._called if not called.job.state.has_ended]
         for called in over:
-            is_done = called.job.state == JobState.DONE
-            called.component.status = "Arrived" if is_done else "Stop"
+            newest = self._jobs[called.component.full].job
+            if called.job is newest:
+                called.component.status = "Arrived" if called.job.state == JobState.DONE else "Stop"
             called.ended(called)

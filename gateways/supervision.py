@@ -21,7 +21,8 @@ from foosim.common.errors import Refused
 from foosim.common.units import parse_pace
 from foosim.deployment.schema import Deployment
 from foosim.gateways.components import details_of
-from foosim.gateways.rows import euler, label_of
+from foosim.gateways.frames import euler
+from foosim.gateways.rows import label_of
 from foosim.gateways.run import Listener, Run
 from foosim.protocol import channels
 from foosim.protocol.codec import decode

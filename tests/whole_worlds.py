@@ -53,6 +53,9 @@ DRIVEN: Final = {
     "tug": ("v_w", (0.8, 2.0)),
     "omni": ("x_y_w", (0.7, 0.7, 2.0)),
     "craft": ("waypoint", (3.0, 3.0, 0.0, 3.0)),
+    "roamer": ("go_within", (9.0, 9.0, 0.2, 0.8)),
+    "hawk": ("fly_within", (9.0, 9.0, 0.0, 3.0, 0.2)),
+    "jumper": ("teleport", (9.0, 9.0, 0.0, 3.0)),
 }
 AROUND: Final[dict[str, Any]] = {
     "sonar": {"kind": "sonar", "rate": "20 Hz", "range": "4 m", "at": {"z": "30 cm"}},
@@ -61,6 +64,32 @@ AROUND: Final[dict[str, Any]] = {
     "map": {"kind": "terrain_map", "rate": "10 Hz", "length": "2 m", "width": "1 m", "resolution": "25 cm"},
 }
 """Sensors of what is around the tug."""
+MEASURED: Final = ("accelerometer", "clock", "motion_state", "satellite_fix", "travel")
+OF_JUMPER: Final[dict[str, Any]] = {kind: {"kind": kind, "rate": "50 Hz"} for kind in MEASURED} | {
+    "touch": {"kind": "collision", "rate": "50 Hz", "at": {"z": "20 cm"}, "reach": "9 m"}
+}
+OF_GOER: Final = {"jobs": {"kind": "job", "actuator": "go", "rate": "20 Hz"}}
+GOERS: Final[dict[str, Any]] = {
+    "roamer": {
+        "model": "holonomic",
+        "at": {"x": "-4 m", "y": "-5 m"},
+        "actuators": {"go": {"kind": "go_within"}},
+        "sensors": OF_GOER,
+    },
+    "hawk": {
+        "model": "rotorcraft",
+        "at": {"x": "-3 m", "y": "-5 m"},
+        "actuators": {"go": {"kind": "fly_within"}},
+        "sensors": OF_GOER,
+    },
+    "jumper": {
+        "model": "holonomic",
+        "at": {"x": "-5 m", "y": "-5 m"},
+        "actuators": {"motion": {"kind": "x_y_w"}, "jump": {"kind": "teleport"}},
+        "sensors": OF_JUMPER,
+    },
+}
+"""Robots by places that they are to come to, or are put at."""
 OF_COMMANDS: Final[dict[str, list[dict[str, Any]]]] = {
     "rover-1": [
         {"kind": "gaussian_noise", "std": "10 mm/s"},
@@ -122,6 +151,7 @@ def mixed() -> str:
         "tug": {"model": "differential_drive", "at": {"x": "-5 m", "y": "-3 m"}, "tags": ["guest"]},
         "omni": {"model": "holonomic", "at": {"x": "-4 m", "y": "-3 m"}},
         "craft": {"model": "rotorcraft", "at": {"x": "-3 m", "y": "-3 m"}},
+        **GOERS,
         "walker": {"model": "mover", "shape": "sphere", "radius": "30 cm", "path": WALK, "speed": "1 m/s"},
     }
     for robot in ("tug", "omni", "craft"):
@@ -142,6 +172,7 @@ def mixed() -> str:
         data["robots"][rover]["actuators"] = {"drive": {"kind": "wheel_speeds", "modifiers": modifiers}}
     data["scene"] = {"kind": "empty"}
     data["rules"] = {"corner": {"kind": "zone", "length": "9 m", "width": "9 m", "tag": "guest"}}
+    data["rules"]["jumps"] = {"kind": "teleported"}
     data["nodes"] = {"all": {"robots": sorted(data["robots"])}}
     for player in data["players"].values():
         player.pop("process", None)

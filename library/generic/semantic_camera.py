@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -33,16 +33,17 @@ class SemanticCameraSettings(ViewSettings):
     where these are out of view to points of the box in it.
 
     It reports what a ray in its view reaches, with `hidden` also what is in its view behind other things. There are at
-    most 64, the nearest first.
+    most 64, the nearest first. Poses are in the `frame` of the camera itself or of the world.
     """
 
     tag: Tag
     hidden: bool = False
+    frame: Literal["own", "world"] = "own"
 
 
 class SeenEntity(Struct, frozen=True):
-    """An entity in view: the pose of its first link in the frame of the camera, x ahead, y to the left, z up (m), its
-    distance, and whether a ray reaches it."""
+    """An entity in view: the pose of its first link in the frame of the camera, x ahead, y to the left, z up (m), or of
+    the world; its distance, and whether a ray reaches it."""
 
     name: str
     position: tuple[float, float, float]
@@ -91,7 +92,8 @@ class SemanticCamera(Sensor):
                 ways += inside
                 owners += [(len(seen), entity.index)] * len(inside)
                 orientation: Quaternion = multiply(back, poses[0][2])
-                seen.append(SeenEntity(entity.name, where, orientation, sqrt(dot(where, where)), False))
+                pose = poses[0][1:] if self._settings.frame == "world" else (where, orientation)
+                seen.append(SeenEntity(entity.name, *pose, sqrt(dot(where, where)), False))
         reached = self._reached(view, place, ways, owners)
         found = [
             SeenEntity(one.name, one.position, one.orientation, one.distance, number in reached)

@@ -88,10 +88,14 @@ class GoTo(Approach):
         x, y, _ = view.read(self.position)
         self._set(view, 1.0, x + 1.0, y + 0.5)
 
+    def demand(self, view: View) -> tuple[float, float]:
+        """Return within which distance it is there (m), and the greatest speed on the way (m/s)."""
+        return self._tolerance, self._drive.most.speed
+
     def progress(self, view: WritableView) -> JobState:
         """Return whether it is there."""
         left_m = hypot(*self._way(view))
-        return self.judge(view, left_m, is_there=left_m <= self._tolerance)
+        return self.judge(view, left_m, is_there=left_m <= self.demand(view)[0])
 
     def _way(self, view: View) -> tuple[float, float]:
         """Return the way that is left (m), in the world frame."""
@@ -102,11 +106,13 @@ class GoTo(Approach):
         """Return the set-points of the drive's motors."""
         x, y = self._way(view)
         left_m, heading = hypot(x, y), view.numbers[self.heading.at]
-        if view.numbers[self.has_target.at] == 0.0 or left_m <= self._tolerance:
+        tolerance_m, fastest = self.demand(view)
+        if view.numbers[self.has_target.at] == 0.0 or left_m <= tolerance_m or fastest == 0.0:
             return self._drive.set_points(Steering(0.0, 0.0, 0.0), view)
         felt = NOTHING_FELT if self._feelers is None else self._feelers.felt(view, heading, left_m)
         bearing, its = shorter(atan2(y, x) - heading), self._drive
-        return its.set_points(steered(left_m, bearing, felt, its.most, its.acceleration, its.turning), view)
+        most = Steering(fastest, 0.0, its.most.turning)
+        return its.set_points(steered(left_m, bearing, felt, most, its.acceleration, its.turning), view)
 
 
 class _Base:

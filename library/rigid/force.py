@@ -1,8 +1,8 @@
-"""A force and a torque on the base of a free robot, in the frame of its first link."""
+"""A force and a torque on the base of a free robot, in the frame of its first link or of the world."""
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
@@ -10,7 +10,7 @@ from foosim.common import units
 from foosim.common.units import Quantity
 from foosim.world.component_types.registry import actuator
 from foosim.world.component_types.settings import ActuatorSettings
-from foosim.world.components.base import Actuator, slot
+from foosim.world.components.base import Actuator, need, slot
 from foosim.world.components.drives import Motor, Wrench
 from foosim.world.components.mounted import body_at
 from foosim.world.components.view import Mounting, View, WritableView
@@ -23,14 +23,18 @@ TorqueMost = Annotated[float, Quantity(units.TORQUE, "0 N m", "10000000 N m")]
 
 
 class ForceSettings(ActuatorSettings):
-    """Pushes a free robot: along each axis with at most `force`, about each axis with at most `torque`."""
+    """Pushes a free robot: along each axis with at most `force`, about each axis with at most `torque`.
+
+    The axes are those of its first link, or, with `frame: world`, of the world.
+    """
 
     force: ForceMost
     torque: TorqueMost
+    frame: Literal["own", "world"] = "own"
 
 
 class Push(Struct, frozen=True):
-    """A force at the centre of mass and a torque, in the frame of the robot's first link."""
+    """A force at the centre of mass and a torque, in the frame of the robot's first link, or of the world."""
 
     force_x: Newtons
     force_y: Newtons
@@ -44,11 +48,12 @@ class Push(Struct, frozen=True):
 class ForceActuator(Actuator):
     """Applies the force and torque of the last command throughout each tick."""
 
-    _set_point = slot(6)
+    _set_point, orientation = slot(6), need()
 
     def __init__(self, settings: ForceSettings, at: Mounting) -> None:
         self._force, self._torque = settings.force, settings.torque
         self._back = conjugate(body_at(at).links[0].principal)
+        self._is_own = settings.frame == "own"
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the least and the greatest of each number."""
@@ -76,4 +81,6 @@ class ForceActuator(Actuator):
     def wrench(self, view: View) -> Wrench:
         """Return force (N) and torque (N m) in the principal axes of the base."""
         x, y, z, a, b, c = view.read(self._set_point)
-        return rotate(self._back, (x, y, z)), rotate(self._back, (a, b, c))
+        i, j, k, w = view.read(self.orientation)
+        back = self._back if self._is_own else (-i, -j, -k, w)
+        return rotate(back, (x, y, z)), rotate(back, (a, b, c))

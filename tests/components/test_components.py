@@ -60,7 +60,7 @@ class Edge(NamedTuple):
 @cache
 def own() -> list[Key]:
     found = [registry.find(type_name, name) for type_name in TYPE_NAMES for name in registry.names(type_name)]
-    return sorted((one.type_name, one.name) for one in found if one.is_own)
+    return sorted((one.type_name, one.name) for one in found if one.is_own and one.type_name != "gateway")
 
 
 @cache

@@ -39,7 +39,7 @@ robots:
     sensors:
       pose: {kind: pose_3d, rate: 50 Hz}
       job: {kind: job, actuator: go, rate: 10 Hz}
-    actuators: {go: {kind: go_to}}
+    actuators: {go: {kind: go_within}}
 gateways:
   morse: {kind: socket, listen: '127.0.0.1:0', streams: 0}
 nodes: {n1: {robots: [cat, mouse]}}
