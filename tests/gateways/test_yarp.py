@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 from collections.abc import Iterator
 from math import degrees
 from pathlib import Path
@@ -20,6 +19,7 @@ from foosim.gateways.yarp import Yarp, items_of
 from foosim.gateways.yarp.ports import Port
 from tests.gateways.serving import Served
 from tests.gateways.test_socket import TEXT
+from tests.gateways.yarp_peers import free_number
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table_yarp.yaml"
 
@@ -65,16 +65,10 @@ class Program(Closable):
         return self._served.gateway.ports[name]
 
 
-def free() -> int:
-    """Return the number of a port that is free."""
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        return int(listener.getsockname()[1])
-
-
 def text_of(path_or_text: str | Path) -> str:
     """Return a deployment whose gateway has a name server of its own."""
     text = path_or_text.read_text() if isinstance(path_or_text, Path) else path_or_text
-    return text.replace("kind: yarp", f"kind: yarp\n    name_server: 127.0.0.1:{free()}")
+    return text.replace("kind: yarp", f"kind: yarp\n    name_server: 127.0.0.1:{free_number()}")
 
 
 def test_a_program_of_2012_plays_the_table_and_a_real_table_is_in_the_capture(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from foosim.gateways.yarp.name_server import name_server
 from foosim.gateways.yarp.ports import NameClient, Port
-from tests.gateways.yarp_peers import PROGRAMS, Rig, run
+from tests.gateways.yarp_peers import PROGRAMS, Rig, run, until
 
 pytestmark = pytest.mark.skipif(
     not (PROGRAMS / "yarp").exists(), reason=f"there is no {PROGRAMS / 'yarp'}: `make yarp` builds it"
@@ -58,9 +58,11 @@ class Programs:
 async def line_with(process: asyncio.subprocess.Process, text: str) -> str:
     """Return the first line of a program that has a text."""
     assert process.stdout is not None
-    while text not in (line := (await process.stdout.readline()).decode()):
-        assert line, f"it ended without {text!r}"
-    return line.strip()
+    lines = [""]
+    while text not in lines[-1]:
+        lines.append((await process.stdout.readline()).decode())
+        assert lines[-1], f"it ended without {text!r}: {lines}"
+    return lines[-1].strip()
 
 
 def test_yarp_finds_reads_writes_and_calls_ports_at_the_name_server_of_the_gateway(tmp_path: Path) -> None:
@@ -108,6 +110,7 @@ def test_ports_of_the_gateway_are_found_at_the_name_server_of_yarp(tmp_path: Pat
             assert "port" in await programs.output("yarp", "name", "query", "/f/out")
             async with programs.running("yarp", "read", "/reader", "/f/out") as reader:
                 await line_with(reader, "Receiving input")
+                await until(lambda: port.links)
                 port.write([1, 2.5])
                 assert await line_with(reader, "1 2.5") == "1 2.5"
             await port.close()
