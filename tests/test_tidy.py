@@ -64,6 +64,7 @@ SHELLS = {
     "gateways/main.py",
     "gateways/socket.py",
     "gateways/supervision.py",
+    "gateways/text.py",
     "gateways/yarp/__init__.py",
     "gateways/yarp/name_server.py",
     "gateways/yarp/ports.py",
