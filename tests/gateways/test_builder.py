@@ -163,6 +163,22 @@ def test_a_component_is_where_it_is_on_what_holds_it(export: Export) -> None:
             {"origin": {"latitude": "1.4333 deg", "longitude": "43.6 deg", "altitude": "135.0 m", "heading": "90 deg"}},
         ),
         ("pose.add_stream('yarp')", {"gateways": {"yarp": {"kind": "yarp"}}}),
+        (
+            "pose.add_stream('yarp', port='/here')",
+            {"gateways": {"yarp": {"kind": "yarp", "ports": {"robot.pose": "/here"}}}},
+        ),
+        (
+            "pose.alter('UTM', x_offset=1e8)\nenv.properties(UTMXOffset=5, UTMYOffset=-4242)",
+            {"gateways": {"socket": {"kind": "socket", "alter": {"robot.pose": ["UTM 100000000.0 -4242.0 0.0"]}}}},
+        ),
+        (
+            "box = Cube('box')\nbox.translate(3, 4, 1)\nbox.scale = (0.5, 0.5, 1)\nbox.properties(Object=True)",
+            {"at": {"x": "3 m", "y": "4 m", "z": "1 m"}, "size": ["1.0 m", "1.0 m", "2 m"], "tags": ["object"]},
+        ),
+        (
+            "power = Battery()\nrobot.append(power)\nspot = Zone(type='Charging')\nspot.size = (3, 4, 1)",
+            {"idle": "0.05 kW", "chargers": [{"x": "0 m", "y": "0 m", "radius": "5 m", "power": "0.1 kW"}]},
+        ),
         ("pose.alter('NED')", {"gateways": {"socket": {"kind": "socket", "alter": {"robot.pose": ["NED"]}}}}),
         (
             "pose.alter('PoseNoise', pos_std=0.5)",
@@ -174,6 +190,8 @@ def test_settings(export: Export, lines: str, found: dict[str, Any], monkeypatch
     monkeypatch.setattr(script, "load_deployment", lambda text, name: None)  # gateways of other middlewares
     made = export(f"robot = ATRV()\npose = Pose()\nrobot.append(pose)\nenv = Environment('empty')\n{lines}\n")
     pose, socket = made["robots"]["robot"]["sensors"]["pose"], made["gateways"].get("socket", {})
+    robot, objects = made["robots"]["robot"], made.get("objects", {})
+    pose = {**pose, **objects.get("box", {}), **robot.get("rules", {}).get("battery", {})}
     known = {**pose, "sync": socket.get("sync"), **made["capture"], **made}
     assert {key: known[key] for key in found} == {
         key: "1000 Hz" if value == "1 kHz" else value for key, value in found.items()
@@ -239,6 +257,10 @@ def test_a_problem_of_the_deployment_has_the_line_of_the_script(export: Export) 
         ("robot = ATRV('a.b')", "game.py:2: the script has raised SyntaxError: Invalid component name: <a.b>"),
         ("import os\nos._exit(5)", "game.py: the script has ended without a result, code 5"),
         ("exit(3)", "game.py: the script has ended with exit code 3"),
+        (
+            "p = Pose()\np.frequency('x')\nr = ATRV()\nr.append(p)\ne = Environment('empty')",
+            "game.py:4: ATRV has a wrong value: TypeError(",
+        ),
         ("robot = ATRV()", "game.py: a script makes one Environment; this one has made 0"),
         ("x = 'x' * 2**40", "game.py:2: the script has raised MemoryError: "),
     ],
