@@ -269,8 +269,9 @@ class Builder:
         """Add a modifier of MORSE: noise to a component, a frame of reference to its gateways."""
         frames, noise = self.table["frames"], entry.get("noise", {})
         if name in frames:
-            offsets = {key[0]: one for key, one in about.items()}
-            self.about["alter"].setdefault(full, []).append({name: offsets or self.offsets} if name == "UTM" else name)
+            offsets = self.offsets | {key[0]: one for key, one in about.items()}
+            frame = "UTM {x} {y} {z}".format(**offsets) if name == "UTM" else name
+            self.about["alter"].setdefault(full, []).append(frame)
         elif name in noise:
             std = formatted(noise[name], self.table["noise"] | about)
             its.setdefault("modifiers", []).append({"kind": "gaussian_noise", "std": std})
