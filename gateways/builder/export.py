@@ -178,7 +178,9 @@ class Builder:
         """Add a robot with its components; its model is the first of its family that takes all its actuators."""
         its, morse = self.classes["robots"][thing["morse"]], thing["morse"]
         models, origin, ours = self.classes["families"][its["family"]], its["origin"], name_of(name, self.robots)
-        (x, y, z), (_, _, yaw) = thing["location"], thing["rotation_euler"]
+        (x, y, z), (roll, pitch, yaw) = thing["location"], thing["rotation_euler"]
+        if roll or pitch or thing["scale"] != [1.0] * 3:
+            self.notes.append(f"{thing['place']}: {name} stands upright and has the size of its class.")
         at = pose((x, y, 0.0 if its["family"] == "ground" else z - origin), (0.0, 0.0, yaw))
         robot: Tree = {"#": f"{thing['place']}, {morse}", "model": "", **at, "tags": [], "sensors": {}, "actuators": {}}
         self.names[name], self.robots[ours] = ours, robot
@@ -217,6 +219,8 @@ class Builder:
         made |= formatted(entry["settings"], {"x": x, "y2": 2 * y, "x2": 2 * x, "z2": 2 * z})
         made |= pose(thing["location"], thing["rotation_euler"])
         self.tagged(thing, name, ours, made)
+        for call in thing["calls"]:
+            self.call(thing, "", *call)
         self.world["objects"] = {**self.world.get("objects", {}), ours: made}
 
     def zone(self, thing: Tree, name: str) -> None:
@@ -231,6 +235,10 @@ class Builder:
         """Add a sensor or an actuator to a robot; return its entry in the table, empty for what is neither."""
         category, morse = part["category"], part["morse"]
         if category not in ("sensors", "actuators"):
+            if category in ("robots", "zones", "environment"):
+                self.say(part["place"], f"{morse} on a robot is not supported")
+            for call in part["calls"]:
+                self.call(part, robot, *call)
             return {}
         channel = name_of(label, {*made["sensors"], *made["actuators"], CHANNEL_ECHO})
         entry: Tree = self.table["classes"][category][morse]
@@ -273,9 +281,9 @@ class Builder:
         if level is not None and level not in levels:
             self.absent(part["place"], f"the level of {part['morse']}", level, levels)
         entry = {**entry, **levels.get(level, {})}
-        for key in part["given"].keys() - entry.get("defaults", {}).keys() - {LEVEL}:
-            if f"{{{key}}}" not in json.dumps(entry):
-                self.notes.append(f"{part['given'][key][1]}: the property {key} of {part['morse']} has no effect here.")
+        for key, (_, place) in part["given"].items():
+            if f"{{{key}}}" not in json.dumps(entry) and key not in (LEVEL, *entry.get("defaults", {})):
+                self.notes.append(f"{place}: the property {key} of {part['morse']} has no effect here.")
         return entry
 
     def altered(self, morse: str, entry: Tree, place: str, name: str, about: Tree, its: Tree, full: str) -> None:
