@@ -26,6 +26,7 @@ from foosim.world.scene import Quaternion, Vector, from_rpy, multiply, rotate
 BASE_HZ: Final = 60.0
 """Rate of MORSE's steps, and of a component without one of its own."""
 LINE_LENGTH_MAX: Final = 150
+SUBSTEPS: Final = 2
 POSES_HZ: Final = 50
 ROBOT_TAG: Final = "robot_tag"
 """What all robots of MORSE have."""
@@ -352,9 +353,10 @@ class Builder:
     def sections(self, nodes: int | None) -> Tree:
         """Return all sections."""
         base_hz = self.base_hz or (BASE_HZ if self.is_fixed else self.fastest_hz)
-        tick_ns = int(NS_PER_S / Fraction(str(base_hz)))
+        substeps = self.world.setdefault("substeps", SUBSTEPS)
+        tick_ns = int(NS_PER_S / Fraction(str(base_hz)) / substeps) * substeps
         if tick_ns * base_hz != NS_PER_S:
-            self.notes.append(f"A tick is a step of MORSE, 1/{base_hz:g} s, rounded down to a nanosecond.")
+            self.notes.append(f"A tick is a step of MORSE, 1/{base_hz:g} s, rounded down to nanoseconds.")
         sensors = [(name, one) for name, robot in self.robots.items() for one in robot["sensors"].values()]
         for name, sensor in sensors:
             if sensor["rate"] > base_hz:
@@ -371,7 +373,6 @@ class Builder:
             "world": name_of(self.script.rpartition(".")[0] or self.script),
             "seed": 1,
             "tick": format_ns(tick_ns),
-            "substeps": 2,
             "pace": "fast" if self.is_fixed else self.pace,
             **({} if is_rigid else {"engine": "pure"}),
             **{key: one for key, one in self.world.items() if key != "templates"},

@@ -160,9 +160,10 @@ def test_a_component_is_where_it_is_on_what_holds_it(export: Export) -> None:
         ("env.set_time_scale(accelerate_by=2)", {"pace": "2x"}),
         ("env.set_time_scale(slowdown_by=2)", {"pace": "0.5x"}),
         ("env.simulator_frequency(50)", {"tick": "20 ms", "rate": "50 Hz"}),
+        ("env.simulator_frequency(90)", {"tick": "11111110 ns", "substeps": 2, "rate": "60 Hz"}),
         ("pose.frequency(1000)", {"tick": "1 ms", "rate": "1 kHz", "poses": "50 Hz"}),
         ("env.set_gravity(1.62)", {"physics": {"gravity": "1.62 m/s2"}}),
-        ("env.set_physics_step_sub(5)", {"substeps": 5}),
+        ("env.set_physics_step_sub(5)", {"substeps": 5, "tick": "16666665 ns"}),
         (
             "env.configure_stream_manager('socket', time_sync=True, sync_port=5000)",
             {"sync": {"port": 5000, "rate": "500000000/8333333 Hz"}},
@@ -172,6 +173,15 @@ def test_a_component_is_where_it_is_on_what_holds_it(export: Export) -> None:
             {"origin": {"latitude": "1.4333 deg", "longitude": "43.6 deg", "altitude": "135.0 m", "heading": "90 deg"}},
         ),
         ("pose.add_stream('yarp')", {"gateways": {"yarp": {"kind": "yarp"}}}),
+        (
+            "pose.add_stream('text')\npose.add_service('pocolibs')",
+            {
+                "gateways": {
+                    "text": {"kind": "text", "robots": ["robot"]},
+                    "tclserv": {"kind": "tclserv", "robots": ["robot"]},
+                }
+            },
+        ),
         (
             "pose.add_stream('yarp', port='/here')",
             {"gateways": {"yarp": {"kind": "yarp", "ports": {"robot.pose": "/here"}}}},
@@ -195,8 +205,7 @@ def test_a_component_is_where_it_is_on_what_holds_it(export: Export) -> None:
         ),
     ],
 )
-def test_settings(export: Export, lines: str, found: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(script, "load_deployment", lambda text, name: None)  # gateways of other middlewares
+def test_settings(export: Export, lines: str, found: dict[str, Any]) -> None:
     made = export(f"robot = ATRV()\npose = Pose()\nrobot.append(pose)\nenv = Environment('empty')\n{lines}\n")
     pose, socket = made["robots"]["robot"]["sensors"]["pose"], made["gateways"].get("socket", {})
     robot, objects = made["robots"]["robot"], made.get("objects", {})
