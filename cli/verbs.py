@@ -103,6 +103,7 @@ class Foosim(Verbs):
         "Before a run": dict.fromkeys(("check", "components", "components check", "urdf", "schema"), "cli.check"),
         "In one process": {"rehearse": "cli.rehearse", "match": "cli.match.command"},
         "Captures and networks": {"capture": "cli.capture.command", "net": "cli.net"},
+        "Other simulators": {"morse": "cli.morse"},
         "Machines and measurements": {"pki": "cli.pki", "doctor": "cli.doctor", "fit": "fitting.main"},
     }
     plumbing: ClassVar[Mapping[str, str]] = {
