@@ -212,7 +212,7 @@ class Sending:
         if {name: type(value) for name, value in arguments.items()} != TAKES[verb]:
             raise BadValue(f"{verb} takes {', '.join(TAKES[verb])}", arguments)
         desk = self._connected()
-        text = {"send": desk.send, "cancel": desk.cancel, "drive": desk.drive}[verb](**arguments)
+        text: str = getattr(desk, verb)(**arguments)
         assert self._client is not None, "connected"
         return Answered(text, max(self._client.tick, 0))
 

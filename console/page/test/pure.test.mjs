@@ -10,6 +10,7 @@ import { curveVariable, lossColour } from "../src/colours.js";
 import { Connection, tokenOf } from "../src/connection.js";
 import { settingsOf } from "../src/disturb.js";
 import { motionOf } from "../src/driving.js";
+import { programsOf } from "../src/machines.js";
 import { scaleLength } from "../src/map.js";
 import { fromAbove } from "../src/map_data.js";
 import { decodePoses } from "../src/messages.js";
@@ -35,6 +36,11 @@ function posesMessage({ generation = 1, tick = 5, links = 1, values = [] } = {})
   values.forEach((value, index) => view.setFloat32(24 + 28 * links + 4 * index, value, true));
   return view.buffer;
 }
+
+test("programs at gateways have a row each, and a gateway without any has one, too", () => {
+  const gateways = { morse: { kind: "socket", programs: [{ name: "tcp/[::1]:9", what: "cat.pose", hz: 50 }] }, log: { kind: "text", programs: [] } };
+  assert.deepEqual(programsOf(gateways), [["morse", "socket", "tcp/[::1]:9", "cat.pose", "50"], ["log", "text", "–", "", ""]]);
+});
 
 test("poses are decoded, and refused where their length is not what they say", () => {
   const poses = decodePoses(posesMessage({ links: 2, values: [1.5, -2] }));
