@@ -1,6 +1,6 @@
 """Gateways: how fast a program of MORSE connects to 500 robots, how soon services answer, what 50 robots cost a tick.
 
-The program asks as pymorse does when it starts: for the description of all robots, then for the port of each stream. Its
+The program asks as pymorse does when it starts: for the description of all robots, then the port of each stream; its
 gateway is in this process, without a run. Services are asked of a gateway in a run of real processes, in realtime. The
 50 robots have their poses heard at 100 Hz by a gateway, and recorded, in a rehearsal: all roles in this process.
 """
