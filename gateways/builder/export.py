@@ -26,6 +26,7 @@ from foosim.world.scene import Quaternion, Vector, from_rpy, multiply, rotate
 BASE_HZ: Final = 60.0
 """Rate of MORSE's steps, and of a component without one of its own."""
 LINE_LENGTH_MAX: Final = 150
+SUBSTEPS: Final = 2
 POSES_HZ: Final = 50
 ROBOT_TAG: Final = "robot_tag"
 """What all robots of MORSE have."""
@@ -178,7 +179,9 @@ class Builder:
         """Add a robot with its components; its model is the first of its family that takes all its actuators."""
         its, morse = self.classes["robots"][thing["morse"]], thing["morse"]
         models, origin, ours = self.classes["families"][its["family"]], its["origin"], name_of(name, self.robots)
-        (x, y, z), (_, _, yaw) = thing["location"], thing["rotation_euler"]
+        (x, y, z), (roll, pitch, yaw) = thing["location"], thing["rotation_euler"]
+        if roll or pitch or thing["scale"] != [1.0] * 3:
+            self.notes.append(f"{thing['place']}: {name} stands upright and has the size of its class.")
         at = pose((x, y, 0.0 if its["family"] == "ground" else z - origin), (0.0, 0.0, yaw))
         robot: Tree = {"#": f"{thing['place']}, {morse}", "model": "", **at, "tags": [], "sensors": {}, "actuators": {}}
         self.names[name], self.robots[ours] = ours, robot
@@ -217,6 +220,8 @@ class Builder:
         made |= formatted(entry["settings"], {"x": x, "y2": 2 * y, "x2": 2 * x, "z2": 2 * z})
         made |= pose(thing["location"], thing["rotation_euler"])
         self.tagged(thing, name, ours, made)
+        for call in thing["calls"]:
+            self.call(thing, "", *call)
         self.world["objects"] = {**self.world.get("objects", {}), ours: made}
 
     def zone(self, thing: Tree, name: str) -> None:
@@ -231,6 +236,10 @@ class Builder:
         """Add a sensor or an actuator to a robot; return its entry in the table, empty for what is neither."""
         category, morse = part["category"], part["morse"]
         if category not in ("sensors", "actuators"):
+            if category in ("robots", "zones", "environment"):
+                self.say(part["place"], f"{morse} on a robot is not supported")
+            for call in part["calls"]:
+                self.call(part, robot, *call)
             return {}
         channel = name_of(label, {*made["sensors"], *made["actuators"], CHANNEL_ECHO})
         entry: Tree = self.table["classes"][category][morse]
@@ -273,9 +282,9 @@ class Builder:
         if level is not None and level not in levels:
             self.absent(part["place"], f"the level of {part['morse']}", level, levels)
         entry = {**entry, **levels.get(level, {})}
-        for key in part["given"].keys() - entry.get("defaults", {}).keys() - {LEVEL}:
-            if f"{{{key}}}" not in json.dumps(entry):
-                self.notes.append(f"{part['given'][key][1]}: the property {key} of {part['morse']} has no effect here.")
+        for key, (_, place) in part["given"].items():
+            if f"{{{key}}}" not in json.dumps(entry) and key not in (LEVEL, *entry.get("defaults", {})):
+                self.notes.append(f"{place}: the property {key} of {part['morse']} has no effect here.")
         return entry
 
     def altered(self, morse: str, entry: Tree, place: str, name: str, about: Tree, its: Tree, full: str) -> None:
@@ -344,9 +353,10 @@ class Builder:
     def sections(self, nodes: int | None) -> Tree:
         """Return all sections."""
         base_hz = self.base_hz or (BASE_HZ if self.is_fixed else self.fastest_hz)
-        tick_ns = int(NS_PER_S / Fraction(str(base_hz)))
+        substeps = self.world.setdefault("substeps", SUBSTEPS)
+        tick_ns = int(NS_PER_S / Fraction(str(base_hz)) / substeps) * substeps
         if tick_ns * base_hz != NS_PER_S:
-            self.notes.append(f"A tick is a step of MORSE, 1/{base_hz:g} s, rounded down to a nanosecond.")
+            self.notes.append(f"A tick is a step of MORSE, 1/{base_hz:g} s, rounded down to nanoseconds.")
         sensors = [(name, one) for name, robot in self.robots.items() for one in robot["sensors"].values()]
         for name, sensor in sensors:
             if sensor["rate"] > base_hz:
@@ -363,7 +373,6 @@ class Builder:
             "world": name_of(self.script.rpartition(".")[0] or self.script),
             "seed": 1,
             "tick": format_ns(tick_ns),
-            "substeps": 2,
             "pace": "fast" if self.is_fixed else self.pace,
             **({} if is_rigid else {"engine": "pure"}),
             **{key: one for key, one in self.world.items() if key != "templates"},

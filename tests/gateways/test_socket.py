@@ -6,12 +6,14 @@ import json
 import random
 import socket
 from collections.abc import Iterator
+from contextlib import ExitStack
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
 from foosim.gateways.lines import LINE_BYTES_MAX, UNREAD_BYTES_MAX
+from foosim.gateways.main import raise_descriptors
 from foosim.gateways.socket import Socket
 from tests.gateways.serving import Served, Wire
 
@@ -266,3 +268,28 @@ def test_garbage_ends_nothing_else(seed: int) -> None:
     result = Served(TEXT, "morse", script).rehearse(60)
     assert good == ['SUCCESS ["Cat.001", "mouse"]']
     assert not result.json["failed"]
+
+
+def test_a_thousand_programs_are_served_and_an_id_is_used_once_at_a_time() -> None:
+    answers: list[str] = []
+    raise_descriptors()
+
+    def script(served: Served) -> Iterator[int]:
+        gateway = served.gateway
+        assert isinstance(gateway, Socket)
+        with ExitStack() as stack:
+            for _ in range(1000):
+                stack.enter_context(socket.create_connection(("127.0.0.1", gateway.service_port)))
+            wire = Wire(served, gateway.service_port)
+            wire.write("one time sleep [1e6]\none simulation list_robots\n")
+            answers.extend(wire.lines(1))
+            while len(gateway.connections) < 1001:
+                served.go_round()
+        while len(gateway.connections) > 1:
+            served.go_round()
+        wire.write("one cancel\n")
+        answers.extend(wire.lines(1))
+        yield 0
+
+    Served(TEXT, "morse", script).rehearse(60)
+    assert answers == ['one FAILED "The request one is still running"', "one PREEMPTED"]

@@ -9,6 +9,7 @@ import { choiceOf, choicesOf } from "../src/choices.js";
 import { curveVariable, lossColour } from "../src/colours.js";
 import { Connection, tokenOf } from "../src/connection.js";
 import { settingsOf } from "../src/disturb.js";
+import { motionOf } from "../src/driving.js";
 import { programsOf } from "../src/machines.js";
 import { scaleLength } from "../src/map.js";
 import { fromAbove } from "../src/map_data.js";
@@ -310,4 +311,11 @@ test("a place is what a robot is sent to: on the ground, or at a height and with
   const pose = [5, 6, 7, 0, 0, Math.SQRT1_2, Math.SQRT1_2];
   assert.deepEqual(numbersTo(["x", "y"], [1.23456, -2], pose, 3), { x: 1.235, y: -2 });
   assert.deepEqual(numbersTo(["x", "y", "z", "yaw"], [1, 2], pose, 3), { x: 1, y: 2, z: 3, yaw: 1.571 });
+});
+
+test("opposite arrow keys cancel each other, and none stops", () => {
+  assert.deepEqual(motionOf(["ArrowUp", "ArrowLeft"]), { ahead: 1, left: 1 });
+  assert.deepEqual(motionOf(["ArrowDown", "ArrowRight"]), { ahead: -1, left: -1 });
+  assert.deepEqual(motionOf(["ArrowUp", "ArrowDown", "ArrowRight"]), { ahead: 0, left: -1 });
+  assert.deepEqual(motionOf([]), { ahead: 0, left: 0 });
 });
