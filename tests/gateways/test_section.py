@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import pytest
 
 from foosim.common.errors import DeploymentError
@@ -41,7 +43,7 @@ def test_each_robot_has_a_client_on_board_to_which_its_own_packets_go_past_the_n
 
 def test_a_trigger_makes_the_own_client_one_in_lockstep() -> None:
     deployment = loaded(("streams: 0", "streams: 0, sync: {rate: 20 Hz}, robots: ['m*']"))
-    assert (deployment.clients["morse"].lockstep, deployment.clients["morse"].rate_hz) == (True, 20)
+    assert (deployment.clients["morse"].lockstep, deployment.clients["morse"].rate_hz) == (True, Fraction(20))
     assert [*deployment.clients] == ["morse", "morse-mouse"]
 
 

@@ -188,10 +188,15 @@ def test_with_a_trigger_each_step_waits_for_bytes_and_without_a_program_none_doe
         assert system is not None
         yield 50  # no program is connected
         wire = Wire(served, gateway.sync_port)
+        while not gateway.connections:
+            served.go_round()
+        (program,) = gateway.connections
 
         def trigger() -> None:
             ticks.append(served.run.tick)
             wire.write(b"sync")
+            while program.count < len(ticks):
+                served.go_round()
 
         for step in range(1, 5):
             system.later(step * 1_000_000_000, trigger)
