@@ -28,7 +28,7 @@ from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
 from foosim.gateways.main import Endpoint, raise_descriptors
 from foosim.gateways.run import Run
-from foosim.gateways.socket import Socket
+from foosim.gateways.socket import Socket, SocketSettings
 from foosim.gateways.supervision import Supervision
 from foosim.simulation.run import rehearse
 from foosim.simulation.system import Settings
@@ -112,6 +112,7 @@ def _unreachable() -> Any:
 def _gateway(count: int, send: Callable[[str, Packet], None]) -> Socket:
     deployment = load_deployment(FLEET.format(count=count, start=-count, port=0), "fleet.yaml")
     run = Run(deployment, "morse", send, lambda: None)
+    assert isinstance(run.settings, SocketSettings)
     gateway = Socket(run.settings, run, Supervision(run, _unreachable))
     run.listeners.append(gateway)
     return gateway
