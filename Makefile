@@ -17,7 +17,7 @@ export PYTHONDONTWRITEBYTECODE :=
 WORKERS := $(shell echo $$(($$(nproc) < 7 ? $$(nproc) + 2 : 8)))
 PYTEST := PYTHONPATH= $(PYTHON) -m pytest --numprocesses $(WORKERS)
 
-.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components corpus robots machines lint page pictures bench compiled clean environment checks second
+.PHONY: help up test slow play minutes swarm swarm-gate faults fuzz stats numbers components corpus robots machines lint page pictures yarp bench compiled clean environment checks second
 
 help:
 	@echo 'make up      run the football table on two nodes (ARGS: options of foosim up)'
@@ -37,6 +37,7 @@ help:
 	@echo 'make lint    ruff and mypy alone'
 	@echo 'make page    lint and type check the page of the console, and bundle it into console/www: needs npm'
 	@echo 'make pictures  the pictures of the docs, from runs in Chromium: needs chromium (ARGS: names of pictures)'
+	@echo 'make yarp    build the programs of YARP, once: tests of its gateway use them where they are'
 	@echo 'make second  the part of the tests that takes a minute, on the newest Python of 3.12 to 3.14 that is found'
 	@echo 'make compiled  .venv-compiled: foosim with its hot path compiled, as pip installs it where a C compiler is'
 	@echo 'make bench   measure speed, latency and throughput of that (ARGS: options of the bench)'
@@ -130,6 +131,9 @@ page:
 pictures: environment
 	@nice $(PYTHON) -m docs.pictures $(ARGS)
 
+yarp: environment
+	@sh tools/yarp.sh
+
 bench: compiled
 	@.venv-compiled/bin/python -m bench $(ARGS)
 
@@ -140,5 +144,5 @@ environment:
 	@sh tools/environment.sh
 
 clean:
-	rm -rf .venv .venv-uv .venv-second .venv-compiled .typecheck .page .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
+	rm -rf .venv .venv-uv .venv-second .venv-compiled .yarp .typecheck .page .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
 	find $(wildcard $(PACKAGES) tests bench) -type d -name __pycache__ -prune -exec rm -rf {} +

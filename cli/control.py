@@ -13,20 +13,26 @@ from foosim.common.errors import BadValue, read_at
 from foosim.common.units import parse_pace
 from foosim.protocol.messages import Answer
 from foosim.runtime.command import JsonOption, RunOption, new_app, print_json
+from foosim.runtime.run_folder import find_run
 
 app = new_app()
 
 
 @app.command()
 def status(run: RunOption = None, json: JsonOption = False) -> None:
-    """Show the state of a run: time, lag, nodes, links, score."""
+    """Show the state of a run: time, lag, nodes, links, score, programs at gateways."""
     from foosim.launcher.display import render_text
 
-    content = control.status(run)
+    gateways = find_run(run).gateways()
+    content = {**control.status(run), "gateways": gateways}
     if json:
         print_json(content)
-    else:
-        print(render_text(content).rstrip())
+        return
+    print(render_text(content).rstrip())
+    for name, gateway in gateways.items():
+        programs = gateway["programs"]
+        rate_hz = sum(one["hz"] for one in programs)
+        print(f"gateway {name}, {gateway['kind']}: {len(programs)} programs, {rate_hz:.0f} messages/s")
 
 
 @app.command()

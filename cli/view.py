@@ -113,8 +113,9 @@ def open_run_sources(
         assert info is not None, "a run that was found has a run file"
         return join(f"run:{name}", endpoint, timeout_s=JOIN_S, pki=pki_of(info))
 
-    ended = partial(how_ended, open_run(name))
-    live = LiveSource(name, viewing, None, ended) if view_only else LiveSource(name, viewing, operating, ended, joining)
+    folder = open_run(name)
+    operate, giving = (None, None) if view_only else (operating, joining)
+    live = LiveSource(name, viewing, operate, partial(how_ended, folder), giving, folder.gateways)
     return [live] if second is None else _followed_live(live, name, second, offset_ns)
 
 

@@ -21,6 +21,7 @@ from foosim.capture.rows import ROW_TYPES, json_schema
 from foosim.cli.verbs import Foosim
 from foosim.common import limits, units
 from foosim.deployment.json_schema import deployment_schema, deployment_schema_text
+from foosim.gateways.table import ROWS
 from foosim.protocol.channels import CHANNELS
 from foosim.runtime.command import shown_argument
 
@@ -291,6 +292,14 @@ def _row_type(value: Mapping[str, Any]) -> str:
     return "bytes, in base64" if value.get("contentEncoding") == "base64" else str(value["type"])
 
 
+def write_morse() -> Iterator[str]:
+    """The rows of gateways: component types, classes of MORSE, fields, services."""
+    yield "| kind | class | fields, in the order of a bottle | services |\n|---|---|---|---|\n"
+    for row in ROWS:
+        fields = "a field for each joint in the settings" if row.joints else " ".join(row.fields) or "none"
+        yield f"| `{row.kind}` | {row.morse} | {fields} | {' '.join(row.services)} |\n"
+
+
 def write_limits() -> Iterator[str]:
     """Yield the limits by name."""
     yield "| limit | value |\n|---|---|\n"
@@ -330,6 +339,7 @@ WRITERS: Final[Mapping[str, Callable[[], Iterator[str]]]] = {
     "units": write_units,
     "channels": write_channels,
     "rows": write_rows,
+    "morse": write_morse,
     "limits": write_limits,
     "deadlines": write_deadlines,
 }

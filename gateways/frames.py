@@ -12,11 +12,11 @@ roll, as MORSE does.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import pi
+from math import asin, atan2, pi
 from typing import Any, Final, NamedTuple
 
 from foosim.common.errors import BadValue, UnknownName
-from foosim.common.exact_math import asin, atan2, hypot, sincos
+from foosim.common.exact_math import hypot, sincos
 from foosim.world.earth import EarthOrigin, Geodesy, to_ecef, to_geodetic
 
 Fields = dict[str, Any]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket as sockets
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any, Final, Generic, TypeVar
 
 from foosim.common.addresses import Address
@@ -13,6 +14,8 @@ from foosim.gateways.gateway import Gateway, Peer
 from foosim.gateways.run import Run
 from foosim.gateways.supervision import Supervision
 
+CLOSE_S: Final = 1.0
+"""How long programs may take to read what was written."""
 LINE_BYTES_MAX: Final = 1 << 20
 UNREAD_BYTES_MAX: Final = 1 << 16
 """A reader that has more than this to read misses messages of streams."""
@@ -48,6 +51,10 @@ class LineServer(Gateway):
             server.close()
         for connection in [*self.connections]:
             connection.transport.close()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(CLOSE_S):
+                while self.connections:
+                    await asyncio.sleep(CLOSE_S / 100.0)
 
     def peers(self) -> Iterator[Peer]:
         yield from (Peer(one.peer, one.what, one.count) for one in self.connections)

@@ -96,6 +96,7 @@ class Supervision(Listener):
         """The newest one that was shown."""
         self._threads = ThreadPoolExecutor(1, "operator")
         self._control: Control | None = None
+        self._quitting: asyncio.Future[str] | None = None
         self._sleeps: list[tuple[float, asyncio.Future[None]]] = []
         self.services: Final[Mapping[str, Mapping[str, Callable[..., Any]]]] = {
             "simulation": {
@@ -104,13 +105,13 @@ class Supervision(Listener):
                 "details": lambda: details_of(run.components.values(), run.robots, run.deployment),
                 "get_scene_objects": self._scene_objects,
                 "list_robots": lambda: [*run.robots],
-                "quit": lambda: self._request("down"),
+                "quit": self._quit,
                 "reset_objects": self._reset,
                 "restore_dynamics": lambda: self._request("resume", "Physics is resumed"),
                 "set_log_level": self._set_log_level,
                 "set_object_position": self._set_position,
                 "suspend_dynamics": lambda: self._request("pause", "Physics is suspended"),
-                "terminate": lambda: self._request("down"),
+                "terminate": self._quit,
             },
             "time": {
                 "mode": lambda: "Fixed Simulation Step" if run.deployment.pace.kind == "fast" else "Best Effort",
@@ -215,6 +216,10 @@ class Supervision(Listener):
         world, frame = await self._looked()
         poses = {name: world.pose(entity, frame) for name, entity in world.entities.items()}
         return {name: [{}, [*position], [*orientation]] for name, (_, position, orientation) in poses.items()}
+
+    def _quit(self) -> None:
+        """End the run, once this is answered."""
+        self._quitting = asyncio.ensure_future(self._request("down"))
 
     def _set_log_level(self, component: str, level: str) -> None:
         try:

@@ -6,6 +6,7 @@ of the wall time of simulated time 0 that late commits do not distort. How late 
 
 from __future__ import annotations
 
+from bisect import insort
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import Final
@@ -44,12 +45,18 @@ class Releases:
         """Lateness of packets, due to sent, of this process, without packets of the run's end."""
         self._tick_ns = tick_ns
         self._anchors: deque[tuple[int, int]] = deque()
+        self._anchor_ns: int | None = None
+        """The least of them."""
         self._waiting: list[Release] = []
+        self._latest_ns: dict[str, int] = {}
+        """When the last one of a client leaves, or has left."""
 
     def set_tempo(self, factor: float, paused: bool) -> None:
         """Apply a new pace: packets that wait leave at once, and the anchor is measured anew."""
         if factor != self.factor or paused != self.paused:
             self._anchors.clear()
+            self._anchor_ns = None
+            self._latest_ns.clear()
             self._waiting = [replace(release, at_ns=0, due_ns=None) for release in self._waiting]
         self.factor = factor
         self.paused = paused
@@ -61,6 +68,7 @@ class Releases:
         self._anchors.append((now_ns, now_ns - int(tick * self._tick_ns / self.factor)))
         while self._anchors[0][0] < now_ns - ANCHOR_WINDOW_NS:
             self._anchors.popleft()
+        self._anchor_ns = min(anchor for _, anchor in self._anchors)
 
     def add(
         self,
@@ -73,14 +81,14 @@ class Releases:
         absent: tuple[str, ...] = (),
     ) -> None:
         """Queue the packets of a closed tick, `since` and `absent` for a client, never before earlier ones."""
-        at_ns = max([now_ns, *(release.at_ns for release in self._waiting if release.client == client)])
+        at_ns = max(now_ns, self._latest_ns.get(client, 0))
         due_ns = None
-        if self.factor and self._anchors and flights:
-            anchor_ns = min(anchor for _, anchor in self._anchors)
-            due_ns = anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor)
+        if self.factor and self._anchor_ns is not None and flights:
+            due_ns = self._anchor_ns + int(max(flight.due_ns for flight in flights) / self.factor)
             at_ns = max(at_ns, due_ns)
-        self._waiting.append(Release(at_ns, client, number, tick, flights, due_ns, since, absent))
-        self._waiting.sort(key=lambda release: (release.at_ns, release.client, release.number))
+        self._latest_ns[client] = at_ns
+        release = Release(at_ns, client, number, tick, flights, due_ns, since, absent)
+        insort(self._waiting, release, key=lambda one: (one.at_ns, one.client, one.number))
 
     def take(self, now_ns: int, everything: bool = False) -> list[Release]:
         """Remove and return packets due by now, in order; at the end of the run `everything`."""

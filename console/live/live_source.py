@@ -73,10 +73,12 @@ class LiveSource:
         operate: Connect | None,
         how_ended: HowEnded = lambda stopped_by: None,
         join: Join | None = None,
+        gateways: Callable[[], Mapping[str, Any]] = dict,
     ) -> None:
-        """`name` is the run's; `operate` None permits no requests, `join` None gives no jobs."""
+        """`name` is the run's; `operate` None permits no requests, `join` None gives no jobs. `gateways` returns which
+        programs are at each gateway (`RunFolder.gateways`)."""
         self._name, self._connect_view, self._connect_operator = name, view, operate
-        self._how_ended = how_ended
+        self._how_ended, self._gateways = how_ended, gateways
         self._has_ended = False
         self._sending = None if join is None else Sending(join)
         self._verbs = () if operate is None else VERBS
@@ -242,7 +244,7 @@ class LiveSource:
                 await self._renew(control, feed, following.watch_arguments(wanted, HZ_MAX), wanted != lease)
                 lease, renewed_s = wanted, now_s
             status = await self._in_thread(lambda: control.status(QUESTION_S, self._closing.is_set))
-            messages = following.take_status(status)
+            messages = following.take_status({**status, "gateways": self._gateways()})
             if wanted.links:
                 messages += await self._in_thread(partial(following.explained, status, wanted))
             for message in messages:

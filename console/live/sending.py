@@ -1,4 +1,5 @@
-"""The console as a client of a live run: connects as the endpoint that the deployment declares for it, and gives jobs.
+"""The console as a client of a live run: connects as the endpoint that the deployment declares for it, gives jobs, and
+drives robots.
 
 It connects when a browser looks, stays for all browsers, and reports the state of the jobs to pages. One that cannot
 connect, as where another console has the endpoint, reports the reason, and tries again. Waiting is done in a thread of
@@ -17,14 +18,22 @@ from foosim.client.client import AGAIN_S, CalledJob, Client
 from foosim.client.commands import CommandEncoder
 from foosim.common.errors import BadValue, Failed, Refused, UnknownName
 from foosim.console.shown.drawing import Drawing
-from foosim.console.shown.scene_json import jobs_of
+from foosim.console.shown.scene_json import DRIVES, drive_of, jobs_of
 from foosim.console.shown.source import Answered, Feed
 from foosim.deployment.schema import Deployment
 from foosim.world.component_types.jobs import JobState
 from foosim.world.components.fitted import BoundActuator, actuators_of
 from foosim.world.layout import Layout
 
-VERBS: Final = ("send", "cancel")
+TAKES: Final[Mapping[str, Mapping[str, type]]] = {
+    "send": {"robot": str, "actuator": str, "numbers": dict},
+    "cancel": {"robot": str, "actuator": str},
+    "drive": {"robot": str, "ahead": int, "left": int},
+}
+"""The verbs, and the types of their arguments."""
+VERBS: Final = (*TAKES,)
+TURNING: Final = 0.5
+"""Of the greatest turn rate, as with MORSE's keyboard."""
 RETRY_S: Final = 5.0
 """Wall time after which a console that could not connect tries again; a request does so at once."""
 
@@ -54,10 +63,13 @@ class Desk:
         encoder = CommandEncoder(deployment)
         reported = {robot: jobs_of(deployment, robot) for robot in sorted(deployment.robots)}
         self._takers = {(robot, one): encoder.actuator(robot, one) for robot, its in reported.items() for one in its}
+        drives = {robot: drive_of(deployment, robot) for robot in reported}
+        self._drives = {robot: channel for robot, channel in drives.items() if channel}
         self._fitted: dict[tuple[str, str], BoundActuator] = {
-            (robot, one.channel): one for robot, its in reported.items() if its
+            (robot, one.channel): one for robot, its in reported.items() if its or drives[robot]
             for one in actuators_of(deployment, layout, layout[robot])
         }  # fmt: skip
+        self._kinds = {robot: deployment.robots[robot].actuators[its].kind for robot, its in self._drives.items()}
         self._called: dict[tuple[str, str], str] = {}
         """The last request to each actuator, in words."""
         client.listen((robot, channel) for robot, its in reported.items() for channel in its.values())
@@ -91,6 +103,23 @@ class Desk:
             raise BadValue(f"{robot}/{actuator}: no job of {self._client.name} to cancel")
         job.cancel()
         return f"{robot}/{actuator}: job {job.number} is cancelled" if job.number else f"{robot}/{actuator}: not sent"
+
+    def drive(self, robot: str, ahead: int, left: int) -> str:
+        """Drive a robot by keys, ahead or back and to the left or right, each 1, 0 or -1; return the command in words.
+
+        The command holds until the next one. Raises UnknownName for a robot without such an actuator, BadValue for
+        other numbers, NotJoined, RunEnded and ConnectionFailed.
+        """
+        if robot not in self._drives:
+            raise UnknownName("no robot that is driven by speeds", robot, [*self._drives])
+        if not {ahead, left} <= {-1, 0, 1}:
+            raise BadValue("ahead and left are 1, 0 or -1", f"{ahead}, {left}")
+        channel = self._drives[robot]
+        limits = self._fitted[robot, channel].actuator.limits()
+        shares = {DRIVES[self._kinds[robot]]: ahead, "angular": TURNING * left}
+        numbers = {name: shares.get(name, 0.0) * most for name, (_, most) in limits.items()}
+        self._client.robots[robot].actuators[channel].set(**numbers)
+        return f"{robot}/{channel}: " + ", ".join(f"{name} {number:g}" for name, number in numbers.items())
 
     def turn(self) -> None:
         """Receive for a moment, and send due commands. Raises RunEnded, NotJoined and ConnectionFailed."""
@@ -180,11 +209,10 @@ class Sending:
     # --- in the thread -----------------------------------------------------------------------------------------------
 
     def _request(self, verb: str, arguments: dict[str, Any]) -> Answered:
-        wanted = {"robot": str, "actuator": str, **({"numbers": dict} if verb == "send" else {})}
-        if {name: type(value) for name, value in arguments.items()} != wanted:
-            raise BadValue(f"{verb} takes {', '.join(wanted)}", arguments)
+        if {name: type(value) for name, value in arguments.items()} != TAKES[verb]:
+            raise BadValue(f"{verb} takes {', '.join(TAKES[verb])}", arguments)
         desk = self._connected()
-        text = (desk.send if verb == "send" else desk.cancel)(**arguments)
+        text: str = getattr(desk, verb)(**arguments)
         assert self._client is not None, "connected"
         return Answered(text, max(self._client.tick, 0))
 

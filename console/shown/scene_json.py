@@ -51,6 +51,8 @@ JOINT_UNITS: Final[Mapping[str, tuple[str, str]]] = {
     "joint_efforts": ("N", "N m"),
 }
 """Of the numbers of joints that slide, and of joints that turn."""
+DRIVES: Final = {"v_w": "linear", "x_y_w": "x"}
+"""Actuators by which a robot is driven with keys, and the name of their speed ahead; `angular` turns it."""
 NO_UNIT: Final = ("",)
 TICKS: Final = ("_ticks", ("ticks",))
 """How a field of a rule's memory is called that counts ticks, and its unit."""
@@ -76,6 +78,7 @@ def scene_content(deployment: Deployment, layout: Layout, scene: Scene) -> dict[
                 "pushable": layout[name].is_free,
                 "settable": settable(deployment, layout, layout[name]),
                 "jobs": jobs_content(deployment, name),
+                "drivable": bool(drive_of(deployment, name)),
             }
         )
     scenery = _shapes(drawn(scene.scenery), meshes)
@@ -242,6 +245,12 @@ def jobs_of(deployment: Deployment, robot: str) -> dict[str, str]:
     """Return the actuators of a robot whose jobs a sensor reports, each with that sensor's channel."""
     sensors = sorted(deployment.robots[robot].sensors.items(), reverse=True)  # of several the first by name counts
     return {its.actuator: channel for channel, its in sensors if isinstance(its, JobSettings)}
+
+
+def drive_of(deployment: Deployment, entity: str) -> str:
+    """Return the actuator of a robot that takes speeds of its body; empty of other entities."""
+    robot = deployment.robots.get(entity)
+    return next((name for name, its in robot.actuators.items() if its.kind in DRIVES), "") if robot else ""
 
 
 def jobs_content(deployment: Deployment, entity: str) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from importlib.resources import files
 from itertools import pairwise
+from math import hypot
 from typing import Any, Final
 
 import yaml
@@ -25,6 +26,7 @@ from foosim.world.scene import Quaternion, Vector, from_rpy, multiply, rotate
 BASE_HZ: Final = 60.0
 """Rate of MORSE's steps, and of a component without one of its own."""
 LINE_LENGTH_MAX: Final = 150
+SUBSTEPS: Final = 2
 POSES_HZ: Final = 50
 ROBOT_TAG: Final = "robot_tag"
 """What all robots of MORSE have."""
@@ -113,11 +115,14 @@ class Builder:
         """The names of robots here, by those of MORSE."""
         self.served: Final[dict[str, dict[str, None]]] = {}
         """Robots by the kind of gateway that serves them."""
-        self.about: Final[dict[str, Tree]] = {"classes": {}, "alter": {}}
+        self.about: Final[dict[str, Tree]] = {"classes": {}, "alter": {}, "ports": {}}
         """Settings of gateways for components, by `ROBOT.CHANNEL`."""
         self.fastest_hz, self.base_hz, self.is_fixed, self.has_keyboard = BASE_HZ, 0.0, False, False
         self.pace: str = "realtime"
         self.sync: Tree = {}
+        self.given: Tree = {}
+        """Properties of the environment."""
+        self.chargers: Final[list[Tree]] = []
         self.distribution: dict[str, list[str]] = {}
 
     def say(self, place: str, text: str) -> None:
@@ -133,14 +138,15 @@ class Builder:
         environments = [thing for thing in self.things if thing["category"] == "environment"]
         if len(environments) != 1 and not self.problems:
             self.say(self.script, f"a script makes one Environment; this one has made {len(environments)}")
-        for thing in environments[:1]:
-            self.environment(thing)
-        for thing, name in self.children(None):
-            if thing["category"] == "robots":
-                self.robot(thing, name)
-            elif thing["category"] == "objects":
-                self.object(thing, name)
-            elif thing["category"] in ("sensors", "actuators"):
+        makers = {"robots": self.robot, "objects": self.object, "zones": self.zone, "environment": self.environment}
+        for category in ("environment", "zones", "robots", "objects"):
+            for thing, name in [(thing, name) for thing, name in self.children(None) if thing["category"] == category]:
+                try:
+                    makers[category](thing, name)
+                except (TypeError, ValueError, LookupError, ArithmeticError) as error:
+                    self.say(thing["place"], f"{thing['morse']} has a wrong value: {error!r}")
+        for thing, _ in self.children(None):
+            if thing["category"] in ("sensors", "actuators"):
                 self.say(thing["place"], f"{thing['morse']} is on no robot")
         for thing in self.things:
             if thing["category"] == "absent" and (thing["morse"] != "bpymorse" or thing["calls"]):
@@ -173,7 +179,9 @@ class Builder:
         """Add a robot with its components; its model is the first of its family that takes all its actuators."""
         its, morse = self.classes["robots"][thing["morse"]], thing["morse"]
         models, origin, ours = self.classes["families"][its["family"]], its["origin"], name_of(name, self.robots)
-        (x, y, z), (_, _, yaw) = thing["location"], thing["rotation_euler"]
+        (x, y, z), (roll, pitch, yaw) = thing["location"], thing["rotation_euler"]
+        if roll or pitch or thing["scale"] != [1.0] * 3:
+            self.notes.append(f"{thing['place']}: {name} stands upright and has the size of its class.")
         at = pose((x, y, 0.0 if its["family"] == "ground" else z - origin), (0.0, 0.0, yaw))
         robot: Tree = {"#": f"{thing['place']}, {morse}", "model": "", **at, "tags": [], "sensors": {}, "actuators": {}}
         self.names[name], self.robots[ours] = ours, robot
@@ -207,20 +215,31 @@ class Builder:
         """Add an object of the world. Zones charge batteries."""
         x, y, z = thing["scale"]
         entry = self.table["classes"]["objects"][thing["morse"]]
-        if entry is None:
-            self.say(thing["place"], f"{thing['morse']}: objects from .blend files are not supported")
-            return
         ours = name_of(name, {*self.robots, *self.world.get("objects", {})})
         made = {"#": f"{thing['place']}, {thing['morse']}", **entry["fixed"], "tags": []}
         made |= formatted(entry["settings"], {"x": x, "y2": 2 * y, "x2": 2 * x, "z2": 2 * z})
         made |= pose(thing["location"], thing["rotation_euler"])
         self.tagged(thing, name, ours, made)
+        for call in thing["calls"]:
+            self.call(thing, "", *call)
         self.world["objects"] = {**self.world.get("objects", {}), ours: made}
+
+    def zone(self, thing: Tree, name: str) -> None:
+        """Add a place that charges batteries: the circle around a zone's box."""
+        kind = first_of(thing["args"], thing["kwargs"])
+        if kind != "Charging":
+            self.absent(thing["place"], "the type of zone", kind, ["Charging"])
+        x, y, _ = (f"{one:g} m" for one in thing["location"])
+        self.chargers.append({"x": x, "y": y, "radius": f"{hypot(*thing['size'][:2]):g} m"})
 
     def component(self, part: Tree, label: str, at: Tree, robot: str, made: Tree) -> Tree:
         """Add a sensor or an actuator to a robot; return its entry in the table, empty for what is neither."""
         category, morse = part["category"], part["morse"]
         if category not in ("sensors", "actuators"):
+            if category in ("robots", "zones", "environment"):
+                self.say(part["place"], f"{morse} on a robot is not supported")
+            for call in part["calls"]:
+                self.call(part, robot, *call)
             return {}
         channel = name_of(label, {*made["sensors"], *made["actuators"], CHANNEL_ECHO})
         entry: Tree = self.table["classes"][category][morse]
@@ -233,7 +252,7 @@ class Builder:
             elif method == "alter":
                 self.altered(morse, entry, place, first_of(args, kwargs), kwargs, its, f"{robot}.{channel}")
             else:
-                self.call(part, robot, method, place, args, kwargs)
+                self.call(part, f"{robot}.{channel}", method, place, args, kwargs)
         entry = self.levelled(part, entry, values)
         if values.get("resolution"):
             values["rays"] = round(values["scan_window"] / values["resolution"]) + 1
@@ -249,6 +268,9 @@ class Builder:
         for section, its_own in formatted(entry.get("world", {}), values).items():
             self.world[section] = {**self.world.get(section, {}), **its_own}
         made["rules"] = {**made.get("rules", {}), **formatted(entry.get("rules", {}), values)}
+        if "battery" in entry.get("rules", {}):
+            power = f"{2 * values['DischargingRate']:g} kW"  # it charges as fast as it discharges
+            made["rules"]["battery"]["chargers"] = [{**place, "power": power} for place in self.chargers]
         if morse != KEYBOARD or all(one["kind"] != entry["kind"] for one in made["actuators"].values()):
             made[category][channel] = its
         self.has_keyboard |= morse == KEYBOARD
@@ -260,46 +282,49 @@ class Builder:
         if level is not None and level not in levels:
             self.absent(part["place"], f"the level of {part['morse']}", level, levels)
         entry = {**entry, **levels.get(level, {})}
-        for key in part["given"].keys() - entry.get("defaults", {}).keys() - {LEVEL}:
-            if f"{{{key}}}" not in json.dumps(entry):
-                self.notes.append(f"{part['given'][key][1]}: the property {key} of {part['morse']} has no effect here.")
+        for key, (_, place) in part["given"].items():
+            if f"{{{key}}}" not in json.dumps(entry) and key not in (LEVEL, *entry.get("defaults", {})):
+                self.notes.append(f"{place}: the property {key} of {part['morse']} has no effect here.")
         return entry
 
     def altered(self, morse: str, entry: Tree, place: str, name: str, about: Tree, its: Tree, full: str) -> None:
         """Add a modifier of MORSE: noise to a component, a frame of reference to its gateways."""
         frames, noise = self.table["frames"], entry.get("noise", {})
         if name in frames:
-            offsets = {key[0]: one for key, one in about.items()}
-            self.about["alter"].setdefault(full, []).append({name: offsets or self.offsets} if name == "UTM" else name)
+            offsets = {f"UTM{key[0].upper()}Offset": one for key, one in about.items()}
+            numbers = "".join(f" {float({**self.given, **offsets}.get(f'UTM{axis}Offset', 0))!r}" for axis in "XYZ")
+            self.about["alter"].setdefault(full, []).append(f"UTM{numbers}" if name == "UTM" else name)
         elif name in noise:
             std = formatted(noise[name], self.table["noise"] | about)
             its.setdefault("modifiers", []).append({"kind": "gaussian_noise", "std": std})
         else:
             self.absent(place, f"the modifier of {morse}", name, [*frames, *noise])
 
-    def call(self, thing: Tree, robot: str, method: str, place: str, args: list[Any], kwargs: Tree) -> None:
-        """Judge a call of any thing: of a middleware, without an effect, or unknown."""
+    def call(self, thing: Tree, full: str, method: str, place: str, args: list[Any], kwargs: Tree) -> None:
+        """Judge a call of any thing, `ROBOT.CHANNEL` or other: of a middleware, without an effect, or unknown."""
         if method in MIDDLEWARE:
             middleware, kinds = first_of(args, kwargs, ""), self.table["middlewares"]
             if middleware not in kinds:
                 self.absent(place, "the middleware", middleware, kinds)
-            elif robot:
-                self.served.setdefault(kinds[middleware], {})[robot] = None
-            if args[1:] or (args and kwargs):
+            elif full:
+                self.served.setdefault(kinds[middleware], {})[full.partition(".")[0]] = None
+            if middleware == "yarp" and "port" in kwargs:
+                self.about["ports"][full] = kwargs["port"]
+            elif args[1:] or (args and kwargs):
                 self.notes.append(f"{place}: further parameters of {method} have no effect here.")
         elif method in self.table["ignored"].split():
             self.notes.append(f"{place}: {thing['morse']}.{method} has no effect here.")
         elif method not in self.table["needless"].split():
             self.say(place, f"{thing['morse']}.{method} is not supported")
 
-    def environment(self, thing: Tree) -> None:
+    def environment(self, thing: Tree, name: str) -> None:
         """Add scene, time and place of the world."""
         scene = first_of(thing["args"], thing["kwargs"], "empty")
         if scene not in self.scenes:
             self.absent(thing["place"], "the scene", scene, self.scenes)
         self.world |= self.scenes.get(scene, {})
         given = {"altitude": 0, "angle_against_north": 90, **{key: one for key, (one, _) in thing["given"].items()}}
-        self.offsets = {key: given.get(f"UTM{key.upper()}Offset", 0) for key in "xyz"}
+        self.given = given
         if {"longitude", "latitude"} <= given.keys():
             heading = f"{180 - given['angle_against_north']:g} deg"
             self.world["origin"] = formatted(self.table["origin"], given) | {"heading": heading}
@@ -328,9 +353,10 @@ class Builder:
     def sections(self, nodes: int | None) -> Tree:
         """Return all sections."""
         base_hz = self.base_hz or (BASE_HZ if self.is_fixed else self.fastest_hz)
-        tick_ns = int(NS_PER_S / Fraction(str(base_hz)))
+        substeps = self.world.setdefault("substeps", SUBSTEPS)
+        tick_ns = int(NS_PER_S / Fraction(str(base_hz)) / substeps) * substeps
         if tick_ns * base_hz != NS_PER_S:
-            self.notes.append(f"A tick is a step of MORSE, 1/{base_hz:g} s, rounded down to a nanosecond.")
+            self.notes.append(f"A tick is a step of MORSE, 1/{base_hz:g} s, rounded down to nanoseconds.")
         sensors = [(name, one) for name, robot in self.robots.items() for one in robot["sensors"].values()]
         for name, sensor in sensors:
             if sensor["rate"] > base_hz:
@@ -347,7 +373,6 @@ class Builder:
             "world": name_of(self.script.rpartition(".")[0] or self.script),
             "seed": 1,
             "tick": format_ns(tick_ns),
-            "substeps": 2,
             "pace": "fast" if self.is_fixed else self.pace,
             **({} if is_rigid else {"engine": "pure"}),
             **{key: one for key, one in self.world.items() if key != "templates"},
@@ -396,7 +421,7 @@ class Builder:
                 its = {
                     key: one for key, one in about.items() if "robots" not in found[kind] or key.split(".")[0] in robots
                 }
-                found[kind] |= {section: its} if its else {}
+                found[kind] |= {section: its} if its and (section != "ports" or kind == "yarp") else {}
         if self.sync:
             found.setdefault("socket", {"kind": "socket"})["sync"] = {**self.sync, "rate": rate}
         return found

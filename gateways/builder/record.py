@@ -19,9 +19,9 @@ from typing import Any, ClassVar, Final, NoReturn
 
 MEMORY_BYTES_MAX: Final = 2 << 30
 MODULES: Final = ("robots", "sensors", "actuators", "environment", "blenderobjects", "morsebuilder")
-NAMED: Final = ("robots", "sensors", "actuators")
+NAMED: Final = ("robots", "sensors", "actuators", "objects")
 """Categories of classes whose first argument that is a text is a name."""
-VECTORS: Final = ("location", "rotation_euler", "scale")
+VECTORS: Final = ("location", "rotation_euler", "scale", "size")
 KEPT: Final = ("number", "place", "basename", "parent", "args", "kwargs", "given", "calls", *VECTORS)
 
 
@@ -37,7 +37,8 @@ class Thing:
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         its = self.__dict__
         its.update(number=len(Thing.made), place=place(), args=args, kwargs=kwargs, basename=None, parent=None)
-        its.update(location=[0.0] * 3, rotation_euler=[0.0] * 3, scale=[1.0] * 3, given={}, calls=[])
+        its.update(location=[0.0] * 3, rotation_euler=[0.0] * 3, scale=[1.0] * 3, size=[1.0] * 3)
+        its.update(given={}, calls=[])
         Thing.made.append(self)
         if self.category in NAMED:
             self.name = kwargs.get("name") or next((arg for arg in args if isinstance(arg, str)), None)

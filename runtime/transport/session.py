@@ -230,7 +230,13 @@ class Session(Closable):
     def subscribe(self, key_expr: str, channel: str, inbox: Inbox) -> None:
         """Offer messages on these keys to the inbox as (channel, last chunk of the key, payload)."""
         self._check()
-        self._drain(self._session.declare_subscriber(key_expr, _queue(inbox)), channel, inbox, _payload)
+        if inbox.on_offer is None:
+            self._drain(self._session.declare_subscriber(key_expr, _queue(inbox)), channel, inbox, _payload)
+            return
+        drain = _Drain(None, channel, inbox, _payload)
+        self.receivers.append(drain)
+        direct = zenoh.handlers.Callback(drain.offer, indirect=False)
+        self._declared.append(self._session.declare_subscriber(key_expr, direct))
 
     def receive(self, key_expr: str, channel: str, read_key: KeyReader, inbox: Inbox) -> None:
         """Let the inbox's reader itself wait for these keys: the fastest path, for messages of every tick.
@@ -340,7 +346,8 @@ class _Drain(_Receiver):
     """The thread between a subscriber's queue and an inbox.
 
     A plain callback of Zenoh would also have a thread and a queue, but one of 256 messages (full, it stops the link
-    while Python is busy) and one that keeps a process from ending.
+    while Python is busy) and one that keeps a process from ending. For an inbox with `on_offer`, whose process may have
+    hundreds of clients, the receiving thread of Zenoh calls `offer` itself.
     """
 
     def __init__(self, handler: Any, channel: str, inbox: Inbox, content: Callable[[zenoh.Sample], bytes]) -> None:
@@ -352,12 +359,16 @@ class _Drain(_Receiver):
     def run(self) -> None:
         """Offer samples until the subscriber is undeclared."""
         for sample in self._handler:
-            try:
-                key = self._concrete_key(sample)
-                if key is not None:
-                    self._inbox.offer((self._channel, _name(key), self._content(sample)))
-            except Exception as error:  # noqa: BLE001
-                self._count_error(error)
+            self.offer(sample)
+
+    def offer(self, sample: zenoh.Sample) -> None:
+        """Offer a sample to the inbox."""
+        try:
+            key = self._concrete_key(sample)
+            if key is not None:
+                self._inbox.offer((self._channel, _name(key), self._content(sample)))
+        except Exception as error:  # noqa: BLE001
+            self._count_error(error)
 
 
 class _Source(_Receiver):

@@ -19,6 +19,7 @@ from foosim.simulation.verify import verify_capture
 from foosim.world.component_types.jobs import JobState
 from foosim.world.layout import build_layout
 from tests.client.scripted import Program, refused
+from tests.frames import Frames
 from tests.kinematic_yard import yard_text
 
 JOBS: Final = {"kind": "job", "actuator": "drive", "rate": "5 Hz"}
@@ -26,6 +27,8 @@ ROBOTS: Final[dict[str, Any]] = {
     "scout": {"model": "holonomic", "actuators": {"drive": {"kind": "go_to"}}, "sensors": {"a": JOBS, "b": JOBS}},
     "drone": {"model": "rotorcraft", "at": {"x": "-1 m", "z": "1 m"}, "actuators": {"drive": {"kind": "waypoint"}},
               "sensors": {"jobs": JOBS}},
+    "tug": {"model": "differential_drive", "at": {"x": "-5 m"}, "speed": "2 m/s", "turn_rate": "90 deg/s",
+            "acceleration": "50 m/s2"},
     "mute": {"model": "holonomic", "at": {"x": "-3 m"}, "actuators": {"drive": {"kind": "go_to"}}},
 }  # fmt: skip
 DEAF: Final = [
@@ -124,3 +127,29 @@ WRONG: Final = (
     ("drone", {"x": 0.0, "y": 0.0, "z": 300.0, "yaw": 0.0}, "BadValue",
      "drone/drive takes x (m), y (m), z (m), yaw (rad): z is beyond its limit of 120 m, 300.0"),
 )  # fmt: skip
+
+
+def test_the_console_drives_a_robot_by_keys() -> None:
+    """Ahead with all of its speed, to the right with half of its turn rate; then it stands."""
+    frames, told = Frames(), list[str]()
+
+    def drive(client: Client) -> None:
+        desk = desk_of(client)
+        told.append(desk.drive("tug", 1, -1))
+        while client.tick < 100:
+            desk.turn()
+        told.append(desk.drive("tug", 0, 0))
+        told.extend(refused(partial(desk.drive, robot, ahead, 0)) for robot, ahead in (("scout", 1), ("tug", 2)))
+        assert desk.jobs() == []
+
+    settings = Settings(clients={"desk": Program(drive)}, on_commit=frames)
+    rehearse(TEXT, "yard.yaml", 300, 1, settings=settings, pace=Pace("realtime"))
+    half, end = (frames.frames[tick] for tick in (50, 299))
+    assert half.at("tug", "wheel_speeds") == 2.0 and half.at("tug", "angular_velocity", 2) < 0.0
+    assert end.vector("tug", "wheel_speeds", 2) == [0.0, 0.0]
+    assert told == [
+        "tug/motion: linear 2, angular -0.785398",
+        "tug/motion: linear 0, angular 0",
+        "UnknownName: no robot that is driven by speeds (there are: tug), 'scout'",
+        "BadValue: ahead and left are 1, 0 or -1, '2, 0'",
+    ]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 from foosim.client.core import ClientCore
 from foosim.client.player import Packet
+from foosim.common.closable import Closable
 from foosim.common.errors import Failed
 from foosim.common.units import Pace
 from foosim.deployment.loader import load_deployment
@@ -48,9 +50,9 @@ class Served:
         self._endpoints: dict[str, Endpoint] = {}
         self.system: System | None = None
         self._tick = self._until = -1
-        self.wires: list[Wire] = []
+        self.wires: list[Closable] = []
 
-    def rehearse(self, ticks: int, nodes: int = 1, seed: int = 1) -> Rehearsed:
+    def rehearse(self, ticks: int, nodes: int = 1, seed: int = 1, capture: Path | None = None) -> Rehearsed:
         """Open the gateway, run the rehearsal, close the gateway."""
         self.loop.run_until_complete(self.gateway.open())
         clients = {client: self._entered(robot) for robot, client in self.run.clients.items()}
@@ -64,6 +66,7 @@ class Served:
                 Settings(clients=clients),
                 pace=Pace("realtime"),
                 prepare=self._keep,
+                capture=capture,
             )
             next(self._script, None)  # after the end
             return result
@@ -108,7 +111,7 @@ class Served:
             core.done(())
 
 
-class Wire:
+class Wire(Closable):
     """A program at a socket of a gateway."""
 
     def __init__(self, served: Served, port: int) -> None:

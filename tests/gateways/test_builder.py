@@ -81,6 +81,15 @@ def test_cat_and_mouse(tmp_path: Path, typed: Typed) -> None:
     assert result.code == 0, result.err
 
 
+def test_run_has_the_nodes_and_the_options_of_up(tmp_path: Path, typed: Typed) -> None:
+    file = tmp_path / "hunt.py"
+    file.write_text(HEAD + HUNT)
+    done = typed("morse", "run")(file, "--nodes", "2", "--no-capture", "--pace", "2y")
+    assert (done.code, done.err.count("--pace: not a pace")) == (2, 1), done.err
+    (made,) = (tmp_path / "state").rglob("hunt.yaml")
+    assert made.read_text() == script.export(file, 2)
+
+
 def test_names_are_those_of_variables(export: Export) -> None:
     made = export("""
         class Mine(Morsy):
@@ -151,9 +160,10 @@ def test_a_component_is_where_it_is_on_what_holds_it(export: Export) -> None:
         ("env.set_time_scale(accelerate_by=2)", {"pace": "2x"}),
         ("env.set_time_scale(slowdown_by=2)", {"pace": "0.5x"}),
         ("env.simulator_frequency(50)", {"tick": "20 ms", "rate": "50 Hz"}),
+        ("env.simulator_frequency(90)", {"tick": "11111110 ns", "substeps": 2, "rate": "60 Hz"}),
         ("pose.frequency(1000)", {"tick": "1 ms", "rate": "1 kHz", "poses": "50 Hz"}),
         ("env.set_gravity(1.62)", {"physics": {"gravity": "1.62 m/s2"}}),
-        ("env.set_physics_step_sub(5)", {"substeps": 5}),
+        ("env.set_physics_step_sub(5)", {"substeps": 5, "tick": "16666665 ns"}),
         (
             "env.configure_stream_manager('socket', time_sync=True, sync_port=5000)",
             {"sync": {"port": 5000, "rate": "500000000/8333333 Hz"}},
@@ -163,6 +173,31 @@ def test_a_component_is_where_it_is_on_what_holds_it(export: Export) -> None:
             {"origin": {"latitude": "1.4333 deg", "longitude": "43.6 deg", "altitude": "135.0 m", "heading": "90 deg"}},
         ),
         ("pose.add_stream('yarp')", {"gateways": {"yarp": {"kind": "yarp"}}}),
+        (
+            "pose.add_stream('text')\npose.add_service('pocolibs')",
+            {
+                "gateways": {
+                    "text": {"kind": "text", "robots": ["robot"]},
+                    "tclserv": {"kind": "tclserv", "robots": ["robot"]},
+                }
+            },
+        ),
+        (
+            "pose.add_stream('yarp', port='/here')",
+            {"gateways": {"yarp": {"kind": "yarp", "ports": {"robot.pose": "/here"}}}},
+        ),
+        (
+            "pose.alter('UTM', x_offset=1e8)\nenv.properties(UTMXOffset=5, UTMYOffset=-4242)",
+            {"gateways": {"socket": {"kind": "socket", "alter": {"robot.pose": ["UTM 100000000.0 -4242.0 0.0"]}}}},
+        ),
+        (
+            "box = Cube('box')\nbox.translate(3, 4, 1)\nbox.scale = (0.5, 0.5, 1)\nbox.properties(Object=True)",
+            {"at": {"x": "3 m", "y": "4 m", "z": "1 m"}, "size": ["1.0 m", "1.0 m", "2 m"], "tags": ["object"]},
+        ),
+        (
+            "power = Battery()\nrobot.append(power)\nspot = Zone(type='Charging')\nspot.size = (3, 4, 1)",
+            {"idle": "0.05 kW", "chargers": [{"x": "0 m", "y": "0 m", "radius": "5 m", "power": "0.1 kW"}]},
+        ),
         ("pose.alter('NED')", {"gateways": {"socket": {"kind": "socket", "alter": {"robot.pose": ["NED"]}}}}),
         (
             "pose.alter('PoseNoise', pos_std=0.5)",
@@ -170,10 +205,11 @@ def test_a_component_is_where_it_is_on_what_holds_it(export: Export) -> None:
         ),
     ],
 )
-def test_settings(export: Export, lines: str, found: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(script, "load_deployment", lambda text, name: None)  # gateways of other middlewares
+def test_settings(export: Export, lines: str, found: dict[str, Any]) -> None:
     made = export(f"robot = ATRV()\npose = Pose()\nrobot.append(pose)\nenv = Environment('empty')\n{lines}\n")
     pose, socket = made["robots"]["robot"]["sensors"]["pose"], made["gateways"].get("socket", {})
+    robot, objects = made["robots"]["robot"], made.get("objects", {})
+    pose = {**pose, **objects.get("box", {}), **robot.get("rules", {}).get("battery", {})}
     known = {**pose, "sync": socket.get("sync"), **made["capture"], **made}
     assert {key: known[key] for key in found} == {
         key: "1000 Hz" if value == "1 kHz" else value for key, value in found.items()
@@ -192,6 +228,28 @@ def test_nodes(export: Export) -> None:
     assert export(text, nodes=2)["nodes"] == {"n1": {"robots": ["a", "b"]}, "n2": {"robots": ["c", "d", "e"]}}
 
 
+def test_what_has_no_effect_is_noted_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "game.py"
+    text = """\
+        robot = ATRV()
+        robot.rotate(x=0.1)
+        robot.set_mass(30)
+        robot.properties(Weight=3, Cost=4)
+        pose = Pose()
+        pose.properties(Zeal=1, Ardour=2, Bloom=3)
+        robot.append(pose)
+        mast = Cylinder('mast')
+        mast.color(1, 0, 0)
+        robot.append(mast)
+        env = Environment('empty')
+        env.select_display_camera(pose)
+        env.fullscreen()
+    """
+    file.write_text(HEAD + dedent(text))
+    notes = [line.split()[1] for line in script.export(file).splitlines() if line.startswith("# game.py")]
+    assert notes == [f"game.py:{line}:" for line in (13, 2, 5, 5, 7, 7, 7, 10, 4)]
+
+
 def test_all_that_is_unsupported_is_named_at_once_with_its_line(tmp_path: Path, typed: Typed) -> None:
     file = tmp_path / "game.py"
     file.write_text(
@@ -202,6 +260,7 @@ def test_all_that_is_unsupported_is_named_at_once_with_its_line(tmp_path: Path, 
         drive, slide = MotionVW(), MotionXYW()
         robot.append(drive)
         robot.append(slide)
+        robot.append(ATRV())
         drive.add_stream('ros', topic='/drive')
         pose = Pose()
         pose.level('fine')
@@ -219,7 +278,7 @@ def test_all_that_is_unsupported_is_named_at_once_with_its_line(tmp_path: Path, 
     done = typed("morse", "export")(file, "-o", tmp_path / "made.yaml")
     assert done.code == 2 and not (tmp_path / "made.yaml").exists()
     lines = [line.split(": ")[0].partition(":")[2] for line in done.err.splitlines()]
-    assert lines == ["", *map(str, (2, 3, 7, 8, 11, 12, 13, 14, 15, 16, 17, 18))]
+    assert lines == ["", *map(str, (2, 3, 7, 8, 9, 12, 13, 14, 15, 16, 17, 18, 19))]
 
 
 def test_a_problem_of_the_deployment_has_the_line_of_the_script(export: Export) -> None:
@@ -239,6 +298,10 @@ def test_a_problem_of_the_deployment_has_the_line_of_the_script(export: Export) 
         ("robot = ATRV('a.b')", "game.py:2: the script has raised SyntaxError: Invalid component name: <a.b>"),
         ("import os\nos._exit(5)", "game.py: the script has ended without a result, code 5"),
         ("exit(3)", "game.py: the script has ended with exit code 3"),
+        (
+            "p = Pose()\np.frequency('x')\nr = ATRV()\nr.append(p)\ne = Environment('empty')",
+            "game.py:4: ATRV has a wrong value: TypeError(",
+        ),
         ("robot = ATRV()", "game.py: a script makes one Environment; this one has made 0"),
         ("x = 'x' * 2**40", "game.py:2: the script has raised MemoryError: "),
     ],

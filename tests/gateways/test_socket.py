@@ -6,12 +6,14 @@ import json
 import random
 import socket
 from collections.abc import Iterator
+from contextlib import ExitStack
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
 from foosim.gateways.lines import LINE_BYTES_MAX, UNREAD_BYTES_MAX
+from foosim.gateways.main import raise_descriptors
 from foosim.gateways.socket import Socket
 from tests.gateways.serving import Served, Wire
 
@@ -186,10 +188,15 @@ def test_with_a_trigger_each_step_waits_for_bytes_and_without_a_program_none_doe
         assert system is not None
         yield 50  # no program is connected
         wire = Wire(served, gateway.sync_port)
+        while not gateway.connections:
+            served.go_round()
+        (program,) = gateway.connections
 
         def trigger() -> None:
             ticks.append(served.run.tick)
             wire.write(b"sync")
+            while program.count < len(ticks):
+                served.go_round()
 
         for step in range(1, 5):
             system.later(step * 1_000_000_000, trigger)
@@ -266,3 +273,28 @@ def test_garbage_ends_nothing_else(seed: int) -> None:
     result = Served(TEXT, "morse", script).rehearse(60)
     assert good == ['SUCCESS ["Cat.001", "mouse"]']
     assert not result.json["failed"]
+
+
+def test_a_thousand_programs_are_served_and_an_id_is_used_once_at_a_time() -> None:
+    answers: list[str] = []
+    raise_descriptors()
+
+    def script(served: Served) -> Iterator[int]:
+        gateway = served.gateway
+        assert isinstance(gateway, Socket)
+        with ExitStack() as stack:
+            for _ in range(1000):
+                stack.enter_context(socket.create_connection(("127.0.0.1", gateway.service_port)))
+            wire = Wire(served, gateway.service_port)
+            wire.write("one time sleep [1e6]\none simulation list_robots\n")
+            answers.extend(wire.lines(1))
+            while len(gateway.connections) < 1001:
+                served.go_round()
+        while len(gateway.connections) > 1:
+            served.go_round()
+        wire.write("one cancel\n")
+        answers.extend(wire.lines(1))
+        yield 0
+
+    Served(TEXT, "morse", script).rehearse(60)
+    assert answers == ['one FAILED "The request one is still running"', "one PREEMPTED"]

@@ -8,7 +8,7 @@ import os
 import re
 import socket
 from collections.abc import Awaitable, Callable
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +20,15 @@ SESSIONS: Final[dict[str, list[tuple[str, str]]]] = json.loads((HERE / "yarp_ses
 """Recorded between programs of YARP 3.5: who sent (c the one that connected) and what, by a name of the session."""
 PROGRAMS: Final = Path(os.environ.get("FOOSIM_YARP", HERE.parents[1] / ".yarp" / "build" / "bin"))
 """Where `make yarp` builds them."""
-WAIT_S: Final = 30.0
+WAIT_S: Final = 20.0
+
+
+def free_number() -> int:
+    """Return a number for a name server, which gives ports those after it: below those that the system gives."""
+    for number in range(15_000 + os.getpid() * 20 % 15_000, 32_000):
+        with suppress(OSError), socket.create_server(("127.0.0.1", number)):
+            return number
+    raise AssertionError("no number is free")
 
 
 class Rig(AsyncExitStack):
@@ -29,9 +37,7 @@ class Rig(AsyncExitStack):
     async def __aenter__(self) -> Rig:
         self.wrong: list[Any] = []
         asyncio.get_running_loop().set_exception_handler(lambda _, context: self.wrong.append(context))
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            number = free.getsockname()[1]
-        self.names = NameClient("127.0.0.1", number)
+        self.names = NameClient("127.0.0.1", free_number())
         server = await name_server(self.names)
         assert isinstance(server, NameServer)
         self.server = server

@@ -42,7 +42,14 @@ FLAGS: Final = (
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
     "--mute-audio",
 )
-KEYS: Final = {"Enter": ("\r", 13), "Escape": ("", 27), "ArrowLeft": ("", 37), "ArrowRight": ("", 39), " ": (" ", 32)}
+KEYS: Final = {
+    "Enter": ("\r", 13),
+    "Escape": ("", 27),
+    "ArrowLeft": ("", 37),
+    "ArrowUp": ("", 38),
+    "ArrowRight": ("", 39),
+    " ": (" ", 32),
+}
 FOUND: Final = """(() => {
   const one = [...document.querySelectorAll(%s)].find((one) => one.textContent.includes(%s) && !one.disabled);
   one.scrollIntoView({block: "nearest"});

@@ -89,9 +89,10 @@ TOASTS = """(window.toasts = [], new MutationObserver((all) => all.forEach(({add
 PORTER = (
     "--set", "robots.porter={model: holonomic, at: {x: 3 m}, actuators: {drive: {kind: go_to}}, "
     "sensors: {jobs: {kind: job, actuator: drive, rate: 5 Hz}}}",
+    "--set", "robots.cart={model: differential_drive, at: {x: 5 m}}",
     "--set", "nodes.blue.robots=[rest]", "--set", "clients={desk: {console: true}}",
 )  # fmt: skip
-"""A robot beside the table that the console can send."""
+"""Robots beside the table that the console can send and drive."""
 
 
 def addresses_of(house: House) -> dict[str, str]:
@@ -234,6 +235,18 @@ def send_a_robot(page: Page) -> None:
     page.until("!document.querySelector('.jobs .cancel').offsetParent")
 
 
+def drive_a_robot(page: Page) -> None:
+    """A pressed arrow key moves the robot, the released one stops it."""
+    page.click(".entities button", "cart")
+    page.click("#drive")
+    page.click("#tab-log")
+    page.press("ArrowUp")
+    for number in (1, 0):
+        page.until(f"document.querySelector('#panel-log').textContent.includes('cart/motion: linear {number}')")
+    page.click("#tab-world")
+    page.click("#drive")
+
+
 def cut_and_heal(page: Page) -> None:
     """A link is chosen, plotted, cut off, its drops explained, and healed."""
     page.click("#tab-network")
@@ -319,6 +332,7 @@ def test_a_page_shows_a_run_and_does_what_people_ask(browser: Page, house: House
         tabs_are_filled(page)
         add_and_move(page)
         send_a_robot(page)
+        drive_a_robot(page)
         cut_and_heal(page)
         lose_the_supervisor(page, house, pause_and_step(page))
         banner = end_the_run(page)

@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import pytest
@@ -28,7 +27,7 @@ del sys.argv[0]
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
 """On Python 3.8 to 3.11 the `__dir__` of pymorse raises, and its process would never end."""
-GATEWAY: Final = "gateways:\n  morse: {kind: socket, listen: '127.0.0.1:0', streams: 0}"
+GATEWAY: Final = "morse: {kind: socket, listen: '127.0.0.1:0', streams: 0}"
 MANY: Final = pytest.mark.campaign
 NODES: Final = {
     1: "n1: {launch: local, robots: [cat, mouse]}",
@@ -37,21 +36,12 @@ NODES: Final = {
 }
 
 
-def with_gateway(folder: Path) -> Path:
-    """Return the deployment with a gateway in place of the cat's player and the console."""
-    text = (DEPLOY / "cat_and_mouse.yaml").read_text()
-    cat, mouse = text.index("  player-cat:"), text.index("  player-mouse:")
-    text = (text[:cat] + text[mouse:]).replace("clients:\n  desk: {console: true}", GATEWAY)
-    path = folder / "cat_and_mouse.yaml"
-    path.write_text(text)
-    return path
-
-
 @pytest.mark.skipif(find_spec("pymorse") is None, reason="pymorse needs Python 3.11 or older")
 @pytest.mark.parametrize("nodes", [pytest.param(1, marks=MANY), pytest.param(2, marks=MANY), 3])
 def test_the_tutorial_s_controller_catches_the_mouse_and_the_run_is_verified(house: House, nodes: int) -> None:
-    house.start("foosim", "up", with_gateway(house.folder), *ONE, "--pace", "2x", "--capture", "run.mcap",
-        "--set", f"nodes={{{NODES[nodes]}}}")  # fmt: skip
+    sets = {"players": "player-mouse: {like: wanderer}", "clients": "", "gateways": GATEWAY, "nodes": NODES[nodes]}
+    options = [word for key, value in sets.items() for word in ("--set", f"{key}={{{value}}}")]
+    house.start("foosim", "up", DEPLOY / "cat_and_mouse.yaml", *ONE, "--pace", "2x", "--capture", "run.mcap", *options)
     log = house.live().logs / "morse.log"
 
     def port() -> str:

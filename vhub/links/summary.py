@@ -7,6 +7,7 @@ fading, of ends 1.5 m above the ground where no place is written, and antennas m
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, gcd, inf
@@ -14,7 +15,7 @@ from typing import Final
 
 from foosim.common.units import format_ns
 from foosim.deployment.network.impairments import Burst, GilbertElliott, Impairments, Markov4
-from foosim.deployment.network.link_settings import NO_RADIO, over, preset_radio
+from foosim.deployment.network.link_settings import NO_RADIO, Profile, over, preset_radio
 from foosim.deployment.network.radios import Radio
 from foosim.deployment.network.rules import Network
 from foosim.deployment.network.traces import read_opportunities
@@ -138,20 +139,28 @@ def uses_of(deployment: Deployment) -> list[SharedSettings]:
     network, profiles = deployment.network, deployment.profiles()
     used = used_links(flows_of(deployment, profiles))
     found: dict[tuple[str, str], SharedSettings] = {}
+    links: Counter[tuple[str, str]] = Counter()
     endpoints = deployment.endpoints()
+    alike = {name: (tuple(profiles.radios_of(name)), name == profiles.console) for name in endpoints}
+    known: dict[tuple[object, ...], Profile] = {}
+    """By what decides the profile of a pair: there may be a million pairs."""
     pairs = ((source, destination) for source in endpoints for destination in endpoints if source != destination)
     for source, destination, rule in ((*pair, rule) for pair in pairs for rule in profiles.rules_for(*pair)):
-        profile = profiles.of_rule(rule, source, destination)
-        key = profile.rule, profile.radio
-        known, carrying = found.get(key), used.get(key, set())
-        links = 1 if known is None or known.links is None else known.links + 1
         pair = source, destination
-        if known is not None and (known.example in carrying or pair not in carrying):
-            found[key] = replace(known, links=links)
+        is_on_board = profiles.body(source) == profiles.body(destination)
+        deciding = rule and rule.id, alike[source], alike[destination], is_on_board
+        profile = known.get(deciding)
+        if profile is None:
+            profile = known[deciding] = profiles.of_rule(rule, source, destination)
+        key = profile.rule, profile.radio
+        links[key] += 1
+        carrying = used.get(key, set())
+        if key in found and (found[key].example in carrying or pair not in carrying):
             continue
         one, other = (HEIGHT_M if place is None else place[2] for place in map(network.place_of, pair))
         count = len(carrying)
-        found[key] = SharedSettings(profile.rule, profile.radio, profile.settings, links, count, pair, (one, other))
+        found[key] = SharedSettings(profile.rule, profile.radio, profile.settings, 0, count, pair, (one, other))
+    found = {key: replace(one, links=links[key]) for key, one in found.items()}
     order = {rule.id: number for number, rule in enumerate(network.links)}
     uses = sorted(found.values(), key=lambda use: (order.get(use.rule, len(order)), use.rule, use.radio))
     idle = [name for name in network.radios if all(use.radio != name for use in uses)]

@@ -27,6 +27,17 @@ export function recoveryText(entry) {
   return `${texts[entry.what] ?? `${entry.what} ${entry.name}`}${after}, epoch ${entry.epoch}`;
 }
 
+/**
+ * The programs at gateways, a row each; a gateway without any has one row, too.
+ * @param {Record<string, any>} gateways
+ * @returns {string[][]} name, kind, program, what it is connected to, rate
+ */
+export function programsOf(gateways) {
+  return Object.entries(gateways).flatMap(([name, { kind, programs }]) =>
+    programs.length ? programs.map((/** @type {any} */ one) => [name, kind, one.name, one.what, number(one.hz, 1)]) : [[name, kind, "–", "", ""]],
+  );
+}
+
 export class Machines {
   /** @param {import("./store.js").Store} store @param {import("./desk.js").Desk} desk */
   constructor(store, desk) {
@@ -37,6 +48,7 @@ export class Machines {
     this.balance = button("Balance", () => void this.desk.ask("balance"), { id: "balance", title: "Move robots from busy nodes to idle ones; the answer says which, and why" });
     this.nodes = h("div", { class: "nodes", "aria-label": "Nodes" });
     this.others = h("tbody");
+    this.gateways = h("tbody");
     this.recoveries = h("ol", { class: "recoveries", "aria-label": "Recoveries" });
     const lag = h("div");
     this.chart = timeChart(lag, { unit: "lag (ms)", height: 140 });
@@ -45,6 +57,7 @@ export class Machines {
       h("section", {}, h("div", { class: "row" }, h("h2", {}, "Nodes"), this.balance), this.head, this.nodes),
       h("section", {}, h("h2", {}, "Lag of ticks"), lag),
       h("section", {}, h("h2", {}, "Other roles"), h("table", {}, h("thead", {}, h("tr", {}, ...columns)), this.others)),
+      (this.atGateways = h("section", { "aria-label": "Gateways" }, h("h2", {}, "Gateways"), h("table", {}, h("thead", {}, h("tr", {}, ...["Name", "Kind", "Program", "Connected to", "Messages/s"].map((name) => h("th", { scope: "col", class: "left" }, name)))), this.gateways))),
       h("section", {}, h("h2", {}, "Recoveries"), this.recoveries),
     );
     store.on("status", (source) => {
@@ -72,6 +85,9 @@ export class Machines {
     keyed(this.others, others, ([name]) => name, () => h("tr", {}, h("th", { scope: "row", class: "left" }), h("td", { class: "left" }), h("td", { class: "left" }), h("td"), h("td", { class: "left" })), (row, [name, process]) => {
       [name, process.role, status.shared?.[name] ?? name, percent(process.busy, 0), doing(process)].forEach((text, index) => setText(row.children[index], text));
     });
+    const programs = programsOf(status.gateways ?? {});
+    this.atGateways.hidden = !programs.length;
+    keyed(this.gateways, programs, (row) => row.slice(0, 4).join(" "), () => h("tr", {}, h("th", { scope: "row", class: "left" }), h("td", { class: "left" }), h("td", { class: "left" }), h("td", { class: "left" }), h("td")), (row, texts) => texts.forEach((text, index) => setText(row.children[index], text)));
     const recoveries = [...(status.recoveries ?? [])].reverse().slice(0, RECOVERIES_SHOWN);
     keyed(this.recoveries, recoveries, (entry) => JSON.stringify(entry), (entry) => h("li", {}, h("b", {}, `${source.seconds(entry.tick).toFixed(3)} s`), ` tick ${entry.tick}: ${recoveryText(entry)}`));
     if (!recoveries.length) this.recoveries.replaceChildren(h("li", { class: "hint" }, "Nothing was lost so far."));

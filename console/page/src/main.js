@@ -5,6 +5,7 @@ import { coloursOf } from "./colours.js";
 import { Connection, tokenOf } from "./connection.js";
 import { Control } from "./control.js";
 import { Desk } from "./desk.js";
+import { Driving } from "./driving.js";
 import { Entities } from "./entities.js";
 import { Eye } from "./eye.js";
 import { Layout, Memory } from "./layout.js";
@@ -81,7 +82,7 @@ const entities = new Entities(store, desk, {
     layout.show("plots");
     plots.search(`${entity} `);
   },
-}, sending.place);
+}, h("div", { class: "sending" }, sending.place, new Driving(store, desk).place));
 new Network(store, desk, plots);
 new Machines(store, desk);
 new Comparison(store);

@@ -18,7 +18,7 @@ interface Shape {
 }
 
 interface SceneLink { name: string; body: string; shapes: Shape[] }
-interface SceneBody { name: string; model: string; links: number[]; robot: boolean; removable: boolean; pushable: boolean; settable: Record<string, string>; jobs: SceneJobs[] }
+interface SceneBody { name: string; model: string; links: number[]; robot: boolean; removable: boolean; pushable: boolean; settable: Record<string, string>; jobs: SceneJobs[]; drivable: boolean }
 /** An actuator of whose jobs a sensor tells, and the names of its commands' numbers. */
 interface SceneJobs { actuator: string; numbers: string[] }
 /** A run of numbers of a field; with a name the number of a joint. */

@@ -9,6 +9,8 @@ import { choiceOf, choicesOf } from "../src/choices.js";
 import { curveVariable, lossColour } from "../src/colours.js";
 import { Connection, tokenOf } from "../src/connection.js";
 import { settingsOf } from "../src/disturb.js";
+import { motionOf } from "../src/driving.js";
+import { programsOf } from "../src/machines.js";
 import { scaleLength } from "../src/map.js";
 import { fromAbove } from "../src/map_data.js";
 import { decodePoses } from "../src/messages.js";
@@ -34,6 +36,11 @@ function posesMessage({ generation = 1, tick = 5, links = 1, values = [] } = {})
   values.forEach((value, index) => view.setFloat32(24 + 28 * links + 4 * index, value, true));
   return view.buffer;
 }
+
+test("programs at gateways have a row each, and a gateway without any has one, too", () => {
+  const gateways = { morse: { kind: "socket", programs: [{ name: "tcp/[::1]:9", what: "cat.pose", hz: 50 }] }, log: { kind: "text", programs: [] } };
+  assert.deepEqual(programsOf(gateways), [["morse", "socket", "tcp/[::1]:9", "cat.pose", "50"], ["log", "text", "–", "", ""]]);
+});
 
 test("poses are decoded, and refused where their length is not what they say", () => {
   const poses = decodePoses(posesMessage({ links: 2, values: [1.5, -2] }));
@@ -304,4 +311,11 @@ test("a place is what a robot is sent to: on the ground, or at a height and with
   const pose = [5, 6, 7, 0, 0, Math.SQRT1_2, Math.SQRT1_2];
   assert.deepEqual(numbersTo(["x", "y"], [1.23456, -2], pose, 3), { x: 1.235, y: -2 });
   assert.deepEqual(numbersTo(["x", "y", "z", "yaw"], [1, 2], pose, 3), { x: 1, y: 2, z: 3, yaw: 1.571 });
+});
+
+test("opposite arrow keys cancel each other, and none stops", () => {
+  assert.deepEqual(motionOf(["ArrowUp", "ArrowLeft"]), { ahead: 1, left: 1 });
+  assert.deepEqual(motionOf(["ArrowDown", "ArrowRight"]), { ahead: -1, left: -1 });
+  assert.deepEqual(motionOf(["ArrowUp", "ArrowDown", "ArrowRight"]), { ahead: 0, left: -1 });
+  assert.deepEqual(motionOf([]), { ahead: 0, left: 0 });
 });
