@@ -19,6 +19,7 @@ from bench import (
     distributed,
     env,
     fleet,
+    gateways,
     lateness,
     machine,
     rays,
@@ -27,6 +28,7 @@ from bench import (
     spares,
     table_one_process,
     verdict,
+    yarp,
 )
 from bench.runs import BenchError
 
@@ -66,6 +68,12 @@ BENCHES: Final = (
     Bench("rays", "scans of a fleet, by the kernel and by numpy", lambda _: rays.rays(), rays.lines),
     Bench("rendering", "pictures of the table", lambda _: rendering.rendering(), rendering.lines),
     Bench(
+        "gateways",
+        "programs of MORSE at 500 robots, services in realtime, 50 robots heard and recorded in one process",
+        with_default(gateways.gateways),
+        gateways.lines,
+    ),
+    Bench(
         "cameras",
         "pictures on the table, and twenty robots with cameras in real time",
         with_default(cameras.cameras),
@@ -75,6 +83,7 @@ BENCHES: Final = (
     Bench("env", "steps of an environment for learning, and of two processes", with_default(env.env), env.lines),
     Bench("answers", "when a job is known to be taken", with_default(answers.answers), answers.lines),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
+    Bench("yarp", "bottles between ports of YARP, and through a run", with_default(yarp.yarp), yarp.lines),
 )
 
 

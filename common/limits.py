@@ -130,7 +130,7 @@ YARP_DEPTH_MAX: Final = 32
 """Lists in lists of a bottle."""
 YARP_BEHIND_BYTES_MAX: Final = 64 * 1024
 """Bytes that wait for a reader of a port before messages to it are dropped."""
-YARP_BEHIND_MESSAGES_MAX: Final = 64
+YARP_BEHIND_MESSAGES_MAX: Final = 256
 """Messages that a reader of a port has not acknowledged before further ones are dropped."""
 YARP_NAMES_MAX: Final = 65_536
 """Ports at the name server that a gateway starts."""

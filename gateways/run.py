@@ -182,27 +182,37 @@ class Run:
             return self._begin(component, result, ended)
         if result.effect is Effect.START:
             self._begin(component, result, lambda called: None)
+        elif result.effect is Effect.PAUSE:
+            self._pause(component, result)
         elif result.effect is Effect.RESUME:
             self._resume(component)
         else:
-            if result.effect is Effect.PAUSE and component.full not in self._paused:
-                its = [called for called in self._called if called.component is component]
-                self._called = [called for called in self._called if called.component is not component]
-                self._paused[component.full] = component.fields or {}, its
-                component.status = "Stop"
             self.command(component, result.fields)
         return result.answer
 
+    def _pause(self, component: Component, order: Order) -> None:
+        """Command a stop that leaves the service of the running job without an answer."""
+        before, jobs = component.fields, self._jobs.get(component.full)
+        if before is None or component.full in self._paused:
+            return
+        waiting = [called for called in self._called if jobs is not None and called.job is jobs.job]
+        self._called = [called for called in self._called if called not in waiting]
+        if jobs is None:
+            self.command(component, order.fields)
+        else:
+            self._begin(component, order, lambda called: None)
+        self._paused[component.full], component.status = (before, waiting), "Stop"
+
     def _resume(self, component: Component) -> None:
-        """Give a command again that was paused, and its job."""
-        fields, its = self._paused.pop(component.full, ({}, []))
-        if not its:
+        """Give the command again that was paused, and its job."""
+        fields, waiting = self._paused.pop(component.full, (None, []))
+        if fields is not None and component.full not in self._jobs:
             self.command(component, fields)
-        for called in its[-1:]:
-            again = self._begin(component, Order(fields), called.ended)
-            called.job = again.job
-            self._called[-1:] = [called]
-        self._called = [*its[:-1], *self._called]
+        elif fields is not None:
+            job = self._begin(component, Order(fields), lambda called: None).job
+            for called in waiting:
+                called.job = job
+            self._called += waiting
 
     def _begin(self, component: Component, order: Order, ended: Callable[[Called], None]) -> Called:
         fields, numbers = command(component, order.fields, order.numbers)
@@ -212,7 +222,7 @@ class Run:
             jobs = self._jobs[component.full] = Jobs(self.deployment, client, component.robot, component.channel)
             jobs.hear(self._reports.samples)
         component.fields, component.status = fields, "Transit"
-        self._called += self._paused.pop(component.full, ({}, []))[1]
+        self._called += self._paused.pop(component.full, (None, []))[1]
         called = Called(component, jobs.call(**numbers), order.answer, ended)
         self._called.append(called)
         self._look_at_jobs()
@@ -220,7 +230,7 @@ class Run:
 
     def cancel(self, called: Called) -> None:
         """Call a service off that takes time."""
-        self._called += self._paused.pop(called.component.full, ({}, []))[1]
+        self._called += self._paused.pop(called.component.full, (None, []))[1]
         called.job.cancel()
         self._look_at_jobs()
 

@@ -183,13 +183,8 @@ def seen(value: Any, component: Component) -> Fields:
 
 
 def joints(value: Any, component: Component) -> Fields:
-    """Positions by the names of joints."""
+    """Positions by the names of joints, or of pan and tilt."""
     return dict(zip(component.row.fields, value.positions, strict=True))
-
-
-def pan_tilt(value: Any, component: Component) -> Fields:
-    """Positions of two joints."""
-    return dict(zip(("pan", "tilt"), value.positions, strict=True))
 
 
 # --- commands --------------------------------------------------------------------------------------------------------
@@ -240,27 +235,11 @@ def by_speed(fields: Fields, component: Component, speed: float = SPEED) -> Fiel
 # --- services --------------------------------------------------------------------------------------------------------
 
 
-def status(component: Component) -> str:
-    """Stop, Transit or Arrived."""
-    return component.status
-
-
 def _moved(component: Component, **by: float) -> Order:
     """Return a pose relative to the last one, at first that of the start."""
     at = _start(component)
     start = {**dict(zip(POSE, at.position, strict=False)), "yaw": at.yaw, "pitch": 0.0, "roll": 0.0}
-    last = component.fields or start
-    return Order({name: last[name] + as_float(by.get(name, 0.0)) for name in POSE})
-
-
-def translate(component: Component, x: float, y: float = 0.0, z: float = 0.0) -> Order:
-    """Move a robot from the last pose that it was put at."""
-    return _moved(component, x=x, y=y, z=z)
-
-
-def rotate_robot(component: Component, roll: float, pitch: float = 0.0, yaw: float = 0.0) -> Order:
-    """Turn a robot from the last pose that it was put at."""
-    return _moved(component, roll=roll, pitch=pitch, yaw=yaw)
+    return Order({name: its + as_float(by.get(name, 0.0)) for name, its in (component.fields or start).items()})
 
 
 def _joints_now(component: Component) -> dict[str, float]:
@@ -271,56 +250,16 @@ def _joints_now(component: Component) -> dict[str, float]:
     raise Refused(f"{component.full}: its robot needs a sensor joint_state, with its joints by name, that has measured")
 
 
-def pan_tilt_now(component: Component) -> list[float]:
-    """The angles of both joints."""
-    return [*_joints_now(component).values()]
-
-
-def joint_names(component: Component) -> list[str]:
-    """The names of the joints."""
-    return [*component.row.fields]
-
-
-def joint_count(component: Component) -> int:
-    """The count of the joints."""
-    return len(component.row.fields)
-
-
-def state(component: Component) -> Fields | None:
-    """The newest positions of all joints."""
-    return component.fields
-
-
-def joint(component: Component, name: str) -> Any:
-    """The newest position of a joint."""
-    return (component.fields or {}).get(_known(component, name))
-
-
 def _known(component: Component, name: str) -> str:
     if name not in component.row.fields:
         raise Refused(f"Joint <{name}> does not exist in armature {component.full}")
     return name
 
 
-def set_joint(component: Component, name: str, value: float) -> Order:
-    """Command one joint."""
-    return Order({_known(component, name): as_float(value)})
-
-
-def set_joints(component: Component, values: list[float]) -> Order:
-    """Command all joints."""
-    return Order(dict(zip(component.row.fields, map(as_float, values), strict=True)))
-
-
 def move_joints(component: Component, wanted: dict[str, float], speed: float | None = None) -> Order:
     """Move joints at a speed; answered when they are there."""
     fields = {_known(component, name): as_float(value) for name, value in wanted.items()}
     return Order(fields, effect=Effect.JOB, numbers=by_speed(fields, component, speed or SPEED))
-
-
-def move_joint(component: Component, name: str, value: float, speed: float | None = None) -> Order:
-    """Move a joint at a speed; answered when it is there."""
-    return move_joints(component, {name: value}, speed)
 
 
 def trajectory(component: Component, way: dict[str, Any]) -> Order:
@@ -331,6 +270,24 @@ def trajectory(component: Component, way: dict[str, Any]) -> Order:
         raise Refused(f"Error: invalid trajectory: key {missing} was expected.") from None
     numbers = {"times": [time for time, _ in points], "positions": [its for _, its in points]}
     return Order({}, effect=Effect.JOB, numbers=numbers)
+
+
+SERVICES: Final[dict[str, Service]] = {
+    "status": lambda component: component.status,
+    "translate": lambda component, x, y=0.0, z=0.0: _moved(component, x=x, y=y, z=z),
+    "rotate_robot": lambda component, roll, pitch=0.0, yaw=0.0: _moved(component, roll=roll, pitch=pitch, yaw=yaw),
+    "pan_tilt_now": lambda component: [*_joints_now(component).values()],
+    "joint_names": lambda component: [*component.row.fields],
+    "joint_count": lambda component: len(component.row.fields),
+    "joint": lambda component, name: (component.fields or {}).get(_known(component, name)),
+    "state": lambda component: component.fields,
+    "set_joint": lambda component, name, value: Order({_known(component, name): as_float(value)}),
+    "set_joints": lambda component, values: Order(dict(zip(component.row.fields, map(as_float, values), strict=True))),
+    "move_joint": lambda component, name, value, speed=None: move_joints(component, {name: value}, speed),
+    "move_joints": move_joints,
+    "trajectory": trajectory,
+}
+"""By their names in rows.yaml."""
 
 
 # --- the table -------------------------------------------------------------------------------------------------------
@@ -353,8 +310,7 @@ def _numbers(names: Mapping[str, str]) -> Callable[[Fields, Component], Fields]:
 def _service(about: str | Mapping[str, Any]) -> Service:
     """Return a function by its name, or the one of a description."""
     if isinstance(about, str):
-        found: Service = globals()[about]
-        return found
+        return SERVICES[about]
     none, kind = inspect.Parameter.empty, inspect.Parameter.POSITIONAL_ONLY
     takes = dict(next(iter(one.items())) if isinstance(one, dict) else (one, none) for one in about.get("takes", ()))
     fixed = about.get("fields", {}) | {name: its for name, its in takes.items() if its is not none}

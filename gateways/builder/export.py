@@ -37,7 +37,9 @@ OWN: Final = ("#", "label", "at")
 """Keys of a robot that no template has."""
 MODULE: Final = "foosim.gateways.builder"
 PLAIN: Final = re.compile(r"-?[\w./%+]+(?:[ -][\w./%+-]+)*")
-"""Texts that need no quotes, beside the words of YAML."""
+"""Texts that need no quotes."""
+WORD: Final = re.compile(r"[-.\d][\d._e+-]*|true|false|null|yes|no|on|off|y|n", re.I)
+"""What some version of YAML reads as anything but a text."""
 
 Tree = dict[str, Any]
 """A mapping of a deployment, or what `record` has written of one thing."""
@@ -67,7 +69,7 @@ def _flow(value: Any) -> str:
         return f"{{{', '.join(f'{key}: {_flow(one)}' for key, one in value.items() if key != '#')}}}"
     if isinstance(value, list):
         return f"[{', '.join(map(_flow, value))}]"
-    if isinstance(value, str) and PLAIN.fullmatch(value) and not isinstance(yaml.safe_load(value), bool | None):
+    if isinstance(value, str) and PLAIN.fullmatch(value) and not WORD.fullmatch(value):
         return value
     return json.dumps(value)
 
@@ -106,6 +108,9 @@ class Builder:
     def __init__(self, script: str, recorded: Tree) -> None:
         """`script` is the name of the file."""
         self.script, self.things = script, recorded["things"]
+        self.on: Final[dict[int | None, list[Tree]]] = {}
+        for thing in self.things:
+            self.on.setdefault(thing["parent"], []).append(thing)
         self.problems = [f"{place}: {text}" for place, text in recorded["problems"]]
         self.notes: Final[list[str]] = []
         self.table, self.scenes, self.classes = data("components.yaml"), data("scenes.yaml"), data("robots.yaml")
@@ -143,7 +148,7 @@ class Builder:
             for thing, name in [(thing, name) for thing, name in self.children(None) if thing["category"] == category]:
                 try:
                     makers[category](thing, name)
-                except (TypeError, ValueError, LookupError, ArithmeticError) as error:
+                except (TypeError, ValueError, LookupError, ArithmeticError, AttributeError) as error:
                     self.say(thing["place"], f"{thing['morse']} has a wrong value: {error!r}")
         for thing, _ in self.children(None):
             if thing["category"] in ("sensors", "actuators"):
@@ -159,11 +164,10 @@ class Builder:
     def children(self, parent: int | None) -> Iterator[tuple[Tree, str]]:
         """Yield what is directly on a thing, with MORSE's names: of equal ones the others get `_001` and so on."""
         count: Counter[str] = Counter()
-        for thing in self.things:
-            if thing["parent"] == parent:
-                name = thing["basename"] or thing["morse"]
-                yield thing, f"{name}_{count[name]:03}" if count[name] else name
-                count[name] += 1
+        for thing in self.on.get(parent, []):
+            name = thing["basename"] or thing["morse"]
+            yield thing, f"{name}_{count[name]:03}" if count[name] else name
+            count[name] += 1
 
     def below(self, parent: int, place: Vector, turned: Quaternion, above: str = "") -> Iterator[Part]:
         """Yield all components on a thing with their names and their places on the robot."""

@@ -97,10 +97,10 @@ def caller() -> FrameType:
 def place(frame: FrameType | None = None) -> str:
     """Return `file:line` of the innermost frame that is in the folder of the script."""
     found = frame = frame or caller()
-    while found.f_back is not None and Path(found.f_code.co_filename).parent != Path(sys.path[0]):
+    while found.f_back is not None and os.path.dirname(found.f_code.co_filename) != sys.path[0]:
         found = found.f_back
     found = found if found.f_back is not None else frame
-    return f"{Path(found.f_code.co_filename).name}:{found.f_lineno}"
+    return f"{os.path.basename(found.f_code.co_filename)}:{found.f_lineno}"
 
 
 def name_all(only: Thing | None = None) -> None:

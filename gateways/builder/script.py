@@ -19,6 +19,7 @@ from foosim.gateways.builder.export import MODULE, Builder, Tree, data
 
 LIMIT_S: Final = 20
 """Wall time that a script has."""
+RESULT_BYTES_MAX: Final = 8 << 20
 GRACE_S: Final = 5
 """What a script that does not heed its end has after that."""
 
@@ -52,6 +53,10 @@ def record(script: Path, limit_s: int) -> Tree:
                 child.wait(limit_s + GRACE_S)
             with suppress(ProcessLookupError):  # with what it has forked
                 os.killpg(child.pid, signal.SIGKILL)
+        if result.exists() and result.stat().st_size > RESULT_BYTES_MAX:
+            raise DeploymentError(
+                [f"{script.name}: the script has made more than {RESULT_BYTES_MAX >> 20} MiB of things"]
+            )
         if not result.exists():
             raise DeploymentError([f"{script.name}: the script has ended without a result, code {child.returncode}"])
         recorded: Tree = json.loads(result.read_text())

@@ -303,6 +303,10 @@ def test_a_problem_of_the_deployment_has_the_line_of_the_script(export: Export) 
             "game.py:4: ATRV has a wrong value: TypeError(",
         ),
         ("robot = ATRV()", "game.py: a script makes one Environment; this one has made 0"),
+        (
+            "for _ in range(2**14):\n    ATRV().name = 'n' * 256",
+            "game.py: the script has made more than 8 MiB of things",
+        ),
         ("x = 'x' * 2**40", "game.py:2: the script has raised MemoryError: "),
     ],
 )

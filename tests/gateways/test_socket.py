@@ -114,6 +114,40 @@ def test_commands_move_robots_and_readings_have_their_times_and_rates() -> None:
     assert speeds == {1.0}
 
 
+def test_a_stop_leaves_a_job_without_an_answer_until_it_goes_on_or_is_called_off() -> None:
+    seen: list[Any] = []
+
+    def script(served: Served) -> Iterator[int]:
+        program = Program(served)
+
+        def place() -> float:
+            return float(json.loads(program.call("mouse.pose", "get_local_data").removeprefix("SUCCESS "))["x"])
+
+        seen.append(program.call("mouse.go", "stop"))  # of what has no place to go to
+        yield served.run.tick + 5
+        for end in ("resume", "cancel", "goto"):
+            going = program.ask("mouse.go", "goto", place() + 1.0, 0.0, 0.0)
+            yield served.run.tick + 20
+            assert program.call("mouse.go", "get_status") == 'SUCCESS "Transit"'
+            assert program.call("mouse.go", "stop") == program.call("mouse.go", "get_status") == 'SUCCESS "Stop"'
+            yield served.run.tick + 50
+            stood = place()
+            yield served.run.tick + 20
+            assert (program.answer(going), place()) == ("", stood)
+            if end == "resume":
+                assert program.call("mouse.go", "resume") == 'SUCCESS "Transit"'
+            elif end == "cancel":
+                program.services.write(f"{going} cancel\n")
+            else:
+                program.ask("mouse.go", "goto", 0.0, 0.0, 0.0)
+            yield served.run.tick + 150
+            seen.append(program.answer(going))
+        seen.append(program.call("mouse.go", "get_status"))
+
+    Served(TEXT, "morse", script).rehearse(900)
+    assert seen == ['SUCCESS "Stop"', 'SUCCESS "Arrived"', "PREEMPTED", "PREEMPTED", 'SUCCESS "Transit"']
+
+
 ANSWERS = {
     "q1 simulation list_robots\n": 'q1 SUCCESS ["Cat.001", "mouse"]',
     "q2 \t simulation   list_robots  []  \n": 'q2 SUCCESS ["Cat.001", "mouse"]',

@@ -80,6 +80,7 @@ def test_a_program_of_2012_plays_the_table_and_a_real_table_is_in_the_capture(tm
         program.append(one)
         one.hear("/position", "/ors/robots/Table/Position/out")
         one.hear("/ball", "/ors/robots/Ball/BallPosition/out")
+        one.hear("/picture", "/ors/robots/Table/CameraMain/out")
         one.write("/ors/robots/Table/RodController0/in", [-0.05, -1.0])
         one.write("/ors/robots/Table/RodController4/in", [0.02, 0.5])
         one.write("/ors/robots/Table/RodController1/in", ["x", 1.0])  # refused
@@ -97,6 +98,11 @@ def test_a_program_of_2012_plays_the_table_and_a_real_table_is_in_the_capture(tm
     wanted = [0.05, 0.0, 0.0, 0.0, -0.02, 0.0, 0.0, 0.0, degrees(1.0), 0.0, 0.0, 0.0, degrees(-0.5), 0.0, 0.0, 0.0]
     assert positions[-1] == pytest.approx(wanted, abs=1e-3)
     assert all(len(place) == 3 for place in places)
+
+    kind, code, header, pixels = program[0].heard["/picture"][0]
+    assert (kind, code, header) == ("mat", "rgba", [4, 320 * 200 * 4, 8, 320, 200])
+    assert set(pixels[3::4]) == {255}
+    assert len(set(pixels)) > 10
 
     packets = [row for row in open_capture(capture).rows(PACKETS) if isinstance(row, PacketRow)]
     packets = [row for row in packets if row.channel == "measured"]

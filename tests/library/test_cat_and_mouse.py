@@ -49,6 +49,12 @@ def test_a_cat_that_looks_away_first_looks_for_the_mouse(level: str) -> None:
     assert caught_s is not None
 
 
+def test_over_a_slow_link_names_catch_and_pictures_do_not() -> None:
+    link = 'network={links: [{id: air, from: "*", to: "*", delay: 5 ms, rate: 1 Mbit/s}]}'
+    caught = [hunt(f"robots.cat.like={level}", "players.player-cat.on=null", link)[1] for level in LEVELS[::2]]
+    assert caught == [None, 5.525], "the guide's figures"
+
+
 def test_nose_to_nose_both_eyes_see_the_mouse_however_it_is_turned() -> None:
     """The middle of the mouse is below the view, and most corners of its box are out of it."""
     for yaw in range(0, 90, 15):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import pytest
@@ -18,7 +20,7 @@ from tests.wire.conftest import ONE, wait_for
 if TYPE_CHECKING:
     from tests.wire.conftest import House
 
-SCRIPT: Final = DEPLOY.parent / "examples" / "cat_and_mouse" / "cat_script.py"
+SCRIPTS: Final = DEPLOY.parent / "examples" / "cat_and_mouse"
 PATCHED: Final = """
 import runpy, sys
 import pymorse
@@ -27,28 +29,52 @@ del sys.argv[0]
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
 """On Python 3.8 to 3.11 the `__dir__` of pymorse raises, and its process would never end."""
-GATEWAY: Final = "morse: {kind: socket, listen: '127.0.0.1:0', streams: 0}"
 MANY: Final = pytest.mark.campaign
 NODES: Final = {
     1: "n1: {launch: local, robots: [cat, mouse]}",
     2: "n1: {launch: local, robots: [cat]}, n2: {launch: local, robots: [mouse]}",
     3: "n1: {launch: local, robots: []}, n2: {launch: local, robots: [cat]}, n3: {launch: local, robots: [mouse]}",
 }
+SOCKET: Final = "{kind: socket, listen: '127.0.0.1:0', streams: 0}"
+
+
+def by_script(nodes: int) -> list[str | Path]:
+    """Return how the builder script is run: its mouse waits for keys, and a rule notes the catch."""
+    rule = "{kind: catch, prey: object, hunter: vehicle, distance: 1.2 m}"
+    sets = (f"gateways={{morse: {SOCKET}}}", f"rules={{mouse: {rule}}}")
+    options = [word for one in sets for word in ("--set", one)]
+    return ["morse", "run", SCRIPTS / "cat_mouse.py", "--nodes", str(nodes), *options]
+
+
+def by_deployment(nodes: int) -> list[str | Path]:
+    """Return how the deployment is run with a gateway in place of the cat's player; its mouse moves."""
+    sets = {"players": "player-mouse: {like: wanderer}", "clients": "", "gateways": f"morse: {SOCKET}"}
+    options = [word for key, value in sets.items() for word in ("--set", f"{key}={{{value}}}")]
+    return ["up", DEPLOY / "cat_and_mouse.yaml", *options, "--set", f"nodes={{{NODES[nodes]}}}"]
+
+
+RUNS: Final = [
+    pytest.param(by, nodes, marks=() if (by, nodes) == (by_script, 3) else MANY)
+    for by in (by_script, by_deployment)
+    for nodes in NODES
+]
 
 
 @pytest.mark.skipif(find_spec("pymorse") is None, reason="pymorse needs Python 3.11 or older")
-@pytest.mark.parametrize("nodes", [pytest.param(1, marks=MANY), pytest.param(2, marks=MANY), 3])
-def test_the_tutorial_s_controller_catches_the_mouse_and_the_run_is_verified(house: House, nodes: int) -> None:
-    sets = {"players": "player-mouse: {like: wanderer}", "clients": "", "gateways": GATEWAY, "nodes": NODES[nodes]}
-    options = [word for key, value in sets.items() for word in ("--set", f"{key}={{{value}}}")]
-    house.start("foosim", "up", DEPLOY / "cat_and_mouse.yaml", *ONE, "--pace", "2x", "--capture", "run.mcap", *options)
+@pytest.mark.parametrize(("by", "nodes"), RUNS)
+def test_the_tutorial_s_controller_catches_the_mouse_and_the_run_is_verified(
+    house: House, by: Callable[[int], list[str | Path]], nodes: int
+) -> None:
+    house.start("foosim", *by(nodes), *ONE, "--pace", "2x", "--capture", "run.mcap")
     log = house.live().logs / "morse.log"
 
     def port() -> str:
         found = re.search(r"services at tcp/127\.0\.0\.1:(\d+)", log.read_text()) if log.exists() else None
         return "" if found is None else found[1]
 
-    cat = subprocess.Popen([sys.executable, "-c", PATCHED, str(SCRIPT), wait_for("the gateway", port)])
+    cat = subprocess.Popen(
+        [sys.executable, "-c", PATCHED, str(SCRIPTS / "cat_script.py"), wait_for("the gateway", port)]
+    )
     try:
         house.ticking()
         with control.connect() as run:
