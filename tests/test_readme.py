@@ -78,8 +78,8 @@ def spans(page: Path) -> list[str]:
 
 def typed_lines(page: Path) -> list[list[str]]:
     """The command lines of foosim in a page's blocks, as words, without what stands before and behind them."""
-    lines = "\n".join(blocks(page, "sh")).splitlines()
-    lines += [line[4:] for line in page.read_text().splitlines() if line.startswith("    ")]
+    indented = [line[4:] for line in page.read_text().splitlines() if line.startswith("    ")]
+    lines = "\n".join([*blocks(page, "sh"), *indented]).replace("\\\n", " ").splitlines()
     words = [shlex.split(line, comments=True) for line in lines if re.search(r"(^|=\. )foosim [a-z]+", line)]
     return [line[line.index("foosim") :] for line in words]
 
