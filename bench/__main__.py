@@ -19,6 +19,7 @@ from bench import (
     distributed,
     env,
     fleet,
+    gateways,
     lateness,
     machine,
     rays,
@@ -66,6 +67,12 @@ BENCHES: Final = (
     Bench("bodies", "rigid bodies of any kind", lambda _: bodies.bodies(), bodies.lines),
     Bench("rays", "scans of a fleet, by the kernel and by numpy", lambda _: rays.rays(), rays.lines),
     Bench("rendering", "pictures of the table", lambda _: rendering.rendering(), rendering.lines),
+    Bench(
+        "gateways",
+        "programs of MORSE at 500 robots, services in realtime, 50 robots heard and recorded in one process",
+        with_default(gateways.gateways),
+        gateways.lines,
+    ),
     Bench(
         "cameras",
         "pictures on the table, and twenty robots with cameras in real time",

@@ -7,13 +7,14 @@ those of the rows (rows.py). All of it is on one asyncio loop, on one thread.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Final, NamedTuple
 
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.finding import Finding
 from foosim.deployment.schema import Deployment
 from foosim.gateways.components import components_of
+from foosim.gateways.rows import Component
 from foosim.gateways.run import Listener, Run
 from foosim.gateways.supervision import Supervision
 from foosim.world.component_types.settings import GatewaySettings
@@ -63,11 +64,13 @@ class Gateway(Listener):
 
 def check_components(name: str, settings: GatewaySettings, deployment: Deployment) -> Iterator[Finding]:
     """Yield components in `classes` and `alter` that the gateway does not serve, and unknown classes and frames."""
-    try:
-        served = components_of(deployment, settings)
-    except BadValue as bad:
-        yield Finding(("gateways", name, "classes"), bad.problem, bad.value, bad.nearest)
-        return
+    served: Mapping[str, Component] = {}
+    for section, its in (("classes", settings.model_copy(update={"alter": {}})), ("alter", settings)):
+        try:
+            served = components_of(deployment, its)
+        except BadValue as bad:
+            yield Finding(("gateways", name, section), bad.problem, bad.value, bad.nearest)
+            return
     for section in ("classes", "alter"):
         for key in getattr(settings, section):
             if key not in served:

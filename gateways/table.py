@@ -96,8 +96,8 @@ def battery(value: Any, component: Component) -> Fields:
 
 def near(value: Any, component: Component) -> Fields:
     """Distances by name."""
-    near = {label_of(component.deployment, one.name): one.distance for one in value.entities}
-    return {"near_objects": near, "near_robots": near}
+    found = {label_of(component.deployment, one.name): one.distance for one in value.entities}
+    return {"near_objects": found, "near_robots": found}
 
 
 def touched(value: Any, component: Component) -> Fields | None:
@@ -145,13 +145,8 @@ def image(value: Any, component: Component) -> Fields:
     colours = value.image()
     height, width, _ = colours.shape
     rgba = np.dstack((colours, np.full((height, width), 255, np.uint8)))
-    matrix = _focal(component.settings)[1]
-    return {
-        "height": height,
-        "width": width,
-        "image": b64encode(rgba.tobytes()).decode(),
-        "intrinsic_matrix": matrix,
-    }
+    picture = {"image": b64encode(rgba.tobytes()).decode(), "intrinsic_matrix": _focal(component.settings)[1]}
+    return {"height": height, "width": width, **picture}
 
 
 def depth(value: Any, component: Component) -> Fields:
@@ -202,9 +197,8 @@ def destination(fields: Fields, component: Component) -> Fields:
 
 def wrench(fields: Fields, component: Component) -> Fields:
     """Force and torque along each axis."""
-    force, torque = fields["force"], fields["torque"]
-    named = zip(("force", "torque"), (force, torque), strict=True)
-    return {f"{name}_{axis}": as_float(its) for name, three in named for axis, its in zip("xyz", three, strict=True)}
+    axes = [(name, axis, its) for name in ("force", "torque") for axis, its in zip("xyz", fields[name], strict=True)]
+    return {f"{name}_{axis}": as_float(its) for name, axis, its in axes}
 
 
 def teleport(fields: Fields, component: Component) -> Fields:
@@ -226,10 +220,8 @@ def by_speed(fields: Fields, component: Component, speed: float = SPEED) -> Fiel
     now = _joints_now(component)
     wanted = {joint: as_float(fields.get(joint, now[joint])) for joint in component.row.fields}
     way = max(abs(to - now[joint]) for joint, to in wanted.items())
-    return {
-        "times": [max(way / as_float(speed), component.deployment.tick_ns / 1e9)],
-        "positions": [[*wanted.values()]],
-    }
+    time_s = max(way / as_float(speed), component.deployment.tick_ns / 1e9)
+    return {"times": [time_s], "positions": [[*wanted.values()]]}
 
 
 # --- services --------------------------------------------------------------------------------------------------------
@@ -294,13 +286,10 @@ SERVICES: Final[dict[str, Service]] = {
 
 
 def _attributes(names: Mapping[str, str | list[str]]) -> Callable[[Any, Component], Fields]:
-    def out(value: Any, component: Component) -> Fields:
-        return {
-            name: getattr(value, of) if isinstance(of, str) else [getattr(value, one) for one in of]
-            for name, of in names.items()
-        }
+    def read(value: Any, of: str | list[str]) -> Any:
+        return getattr(value, of) if isinstance(of, str) else [getattr(value, one) for one in of]
 
-    return out
+    return lambda value, _: {name: read(value, of) for name, of in names.items()}
 
 
 def _numbers(names: Mapping[str, str]) -> Callable[[Fields, Component], Fields]:

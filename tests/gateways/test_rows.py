@@ -6,10 +6,12 @@ from base64 import b64decode
 from collections.abc import Callable
 from functools import cache
 from math import atan2, cos, hypot, pi, sin, tan
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import pytest
+import yaml
 
 from foosim.common.errors import BadValue, Refused
 from foosim.deployment.loader import load_deployment
@@ -533,6 +535,19 @@ def test_frames_are_applied_to_readings_and_commands_in_their_order() -> None:
     go.fields, numbers = command(go, {"x": 2.0, "y": 1.0})
     assert (numbers["x"], numbers["y"]) == (1.0, 2.0) and go.fields["x"] == 2.0
     assert command(go, {"x": 3.0})[1] == {**numbers, "y": 3.0}, "the rest stays, in the frame of the command"
+
+
+def test_the_builder_writes_classes_of_the_table() -> None:
+    classes = yaml.safe_load((Path(__file__).parents[2] / "gateways" / "builder" / "components.yaml").read_text())[
+        "classes"
+    ]
+    written = {
+        (its["kind"], its.get("row", morse))
+        for section in ("sensors", "actuators")
+        for morse, one in classes[section].items()
+        for its in (one, *({**one, **level} for level in one.get("levels", {}).values()))
+    }
+    assert len(written) > 20 and written <= {(row.kind, row.morse) for row in ROWS}
 
 
 def test_euler_angles_turn_back() -> None:

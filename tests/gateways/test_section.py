@@ -70,7 +70,11 @@ def test_it_has_a_process_of_its_own_with_the_certificates_of_its_clients(shape:
         (("streams: 0", "streams: 0, classes: {mouse.pose: Pos}"), "nearest is 'Pose'"),
         (("streams: 0", "streams: 0, classes: {mouse.poze: Pose}"), "no component that the gateway serves"),
         (("streams: 0", "streams: 0, alter: {mouse.poze: [NED]}"), "no component that the gateway serves"),
-        (("streams: 0", "streams: 0, alter: {mouse.pose: [NEDD]}"), "'NEDD'"),
+        (("streams: 0", "streams: 0, alter: {mouse.pose: [NEDD]}"), "gateways.morse.alter: unknown frame"),
+        (
+            ("streams: 0", "streams: 0, alter: {mouse.pose: [ECEF]}"),
+            "gateways.morse.alter: in a world without",
+        ),
     ],
 )
 def test_what_is_wrong_is_named_with_its_place(change: tuple[str, str], problem: str) -> None:
