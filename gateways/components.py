@@ -22,9 +22,13 @@ def send_radio(component: Component, to: str, data: Any) -> Order:
     return Order({"to": to, "data": data})
 
 
-def radios(deployment: Deployment, robot: str) -> Iterator[Component]:
+def robots_of(deployment: Deployment, settings: GatewaySettings) -> dict[str, str]:
+    """Return the robots that a gateway serves, by the name that programs know."""
+    return {settings.names.get(robot) or label_of(deployment, robot): robot for robot in settings.robots}
+
+
+def radios(deployment: Deployment, robot: str, label: str) -> Iterator[Component]:
     """Yield the components of a robot that send packets to other robots and receive theirs."""
-    label = label_of(deployment, robot)
     sends = Row(RADIO, "Radio", ("to", "data"), into=lambda fields, _: fields, services={"send": send_radio})
     takes = Row(RADIO, "RadioReceiver", ("from", "data"), out=lambda value, _: value)
     for channel, row in ((RADIO, sends), (RECEIVED, takes)):
@@ -37,10 +41,10 @@ def components_of(deployment: Deployment, settings: GatewaySettings) -> dict[str
     Raises BadValue for a class that one of them does not have, and frames in which it cannot be given.
     """
     found: dict[str, Component] = {}
-    for robot in settings.robots:
-        its, label = deployment.robots[robot], label_of(deployment, robot)
+    for label, robot in robots_of(deployment, settings).items():
+        its = deployment.robots[robot]
         if len(settings.robots) > 1:
-            found |= {f"{robot}.{one.channel}": one for one in radios(deployment, robot)}
+            found |= {f"{robot}.{one.channel}": one for one in radios(deployment, robot, label)}
         parts: dict[str, SensorSettings | ActuatorSettings] = {**its.sensors, **its.actuators}
         for channel, one in parts.items():
             if one.kind != "job":

@@ -71,6 +71,10 @@ def check_components(name: str, settings: GatewaySettings, deployment: Deploymen
         except BadValue as bad:
             yield Finding(("gateways", name, section), bad.problem, bad.value, bad.nearest)
             return
+    for key in settings.names:
+        if key not in settings.robots:
+            unknown = UnknownName("no robot that the gateway serves", key, settings.robots)
+            yield Finding(("gateways", name, "names", key), unknown.problem, key, unknown.nearest, at="key")
     for section in ("classes", "alter"):
         for key in getattr(settings, section):
             if key not in served:

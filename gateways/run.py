@@ -19,8 +19,8 @@ from foosim.common.errors import Malformed, Refused
 from foosim.common.json_text import decode_json, encode_json
 from foosim.deployment.channel_kinds import channels_of
 from foosim.deployment.schema import Deployment
-from foosim.gateways.components import RADIO, RECEIVED, components_of
-from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, label_of, reading
+from foosim.gateways.components import RADIO, RECEIVED, components_of, robots_of
+from foosim.gateways.rows import Component, Effect, Fields, Order, call, command, reading
 from foosim.protocol.messages import Received
 from foosim.world.component_types.jobs import JobState
 
@@ -70,8 +70,8 @@ class Run:
         self.listeners: Final[list[Listener]] = []
         self.clients: Final = self.settings.clients(name)
         """The names of the gateway's clients by robot; its own one is that of no robot."""
-        self.robots: Final = {label_of(deployment, robot): robot for robot in self.settings.robots}
-        """By label."""
+        self.robots: Final = robots_of(deployment, self.settings)
+        """By the name that programs know."""
         found = components_of(deployment, self.settings)
         self.components: Final = {one.full: one for one in found.values()}
         """By MORSE's names, `ROBOT.COMPONENT`, of labels where there are any."""
@@ -134,7 +134,7 @@ class Run:
             self._log.warning("a packet to %s: %s", robot, malformed)
             return
         if component is not None:
-            label = label_of(self.deployment, sender) if sender else packet.source
+            label = next((label for label, robot in self.robots.items() if robot == sender), packet.source)
             self._deliver(component, {"from": label, "data": data}, packet)
 
     def _deliver(self, component: Component, fields: Fields, packet: Received) -> None:

@@ -19,7 +19,6 @@ import numpy as np
 from foosim.client.control import Control
 from foosim.common.errors import Refused
 from foosim.common.units import parse_pace
-from foosim.deployment.schema import Deployment
 from foosim.gateways.components import details_of
 from foosim.gateways.frames import euler
 from foosim.gateways.rows import label_of
@@ -62,19 +61,22 @@ class Frames(Inbox):
 class World:
     """The world of a run, for what is computed from its frames."""
 
-    def __init__(self, deployment: Deployment, control: Control) -> None:
+    def __init__(self, run: Run, control: Control) -> None:
         """Fetches the files that the deployment names."""
+        deployment, names = run.deployment, {robot: name for name, robot in run.robots.items()}
         self.spec: Final = deployment.with_assets(control.files(deployment)) if deployment.files() else deployment
         self.start: Final = initial_frame(self.spec)
         self.surroundings: Final = Surroundings(self.spec, self.start.layout)
         bodies = self.surroundings.bodies
         self.entities: Final = {
-            label_of(self.spec, one.name): one for one in self.start.layout.entities if one.name in bodies
+            names.get(one.name) or label_of(self.spec, one.name): one
+            for one in self.start.layout.entities
+            if one.name in bodies
         }
-        """Those with a place, by label."""
+        """Those with a place, by the name that programs know."""
 
     def entity(self, name: str) -> Entity:
-        """Return an entity by label. Raises Refused."""
+        """Return an entity by the name that programs know. Raises Refused."""
         if name not in self.entities:
             raise Refused(f"{name} does not exist in the simulation ")
         return self.entities[name]
@@ -176,7 +178,7 @@ class Supervision(Listener):
     async def _looked(self) -> tuple[World, Frame]:
         """Return the world, made at the first look, and its newest frame."""
         if self._world is None:
-            self._world = await self.in_thread(lambda: World(self._run.deployment, self._session()))
+            self._world = await self.in_thread(lambda: World(self._run, self._session()))
         world, commit = self._world, self._commit
         if commit is None:
             return world, world.start

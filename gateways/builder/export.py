@@ -120,8 +120,8 @@ class Builder:
         """The names of robots here, by those of MORSE."""
         self.served: Final[dict[str, dict[str, None]]] = {}
         """Robots by the kind of gateway that serves them."""
-        self.about: Final[dict[str, Tree]] = {"classes": {}, "alter": {}, "ports": {}}
-        """Settings of gateways for components, by `ROBOT.CHANNEL`."""
+        self.about: Final[dict[str, Tree]] = {"names": {}, "classes": {}, "alter": {}, "ports": {}}
+        """Settings of gateways for robots, and for components by `ROBOT.CHANNEL`."""
         self.fastest_hz, self.base_hz, self.is_fixed, self.has_keyboard = BASE_HZ, 0.0, False, False
         self.pace: str = "realtime"
         self.sync: Tree = {}
@@ -212,8 +212,8 @@ class Builder:
                 made["tags"] = [*made["tags"], name_of(value if key == "Type" else key)]
             elif key != "Label" and value is not False:
                 self.notes.append(f"{place}: the property {key} of {name} has no effect here.")
-        if label != name:
-            self.notes.append(f"{thing['given']['Label'][1]}: {name} has the name {label} for programs and cameras.")
+        if label != name and ours in self.robots:
+            self.about["names"][ours] = name
 
     def object(self, thing: Tree, name: str) -> None:
         """Add an object of the world. Zones charge batteries."""

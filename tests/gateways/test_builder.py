@@ -76,6 +76,7 @@ def test_cat_and_mouse(tmp_path: Path, typed: Typed) -> None:
     assert (mouse.at.position, mouse.at.yaw) == ((1.0, 2.0, 0.0), 1.5)  # type: ignore[attr-defined]
     assert (mouse.actuators["keys"].kind, mouse.speed) == ("v_w", 3.0)  # type: ignore[attr-defined]
     assert deployment.console == "console" and deployment.gateways["socket"].robots == ["cat", "mouse"]
+    assert deployment.gateways["socket"].names == {"mouse": "mouse"}
     assert len(deployment.scenery) == 50
     assert "hunt.py:19: Environment.set_camera_location has no effect here." in first.read_text()
     result = typed("rehearse")(first, "--for", "200ms", "--nodes", "2")

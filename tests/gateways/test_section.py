@@ -69,6 +69,7 @@ def test_it_has_a_process_of_its_own_with_the_certificates_of_its_clients(shape:
         (("nodes:", "clients: {morse-mouse: {}}\nnodes:"), "gateways.morse: it makes a client of a name that there is"),
         (("streams: 0", "streams: 0, classes: {mouse.pose: Pos}"), "nearest is 'Pose'"),
         (("streams: 0", "streams: 0, classes: {mouse.poze: Pose}"), "no component that the gateway serves"),
+        (("streams: 0", "streams: 0, names: {mous: m}"), "no robot that the gateway serves"),
         (("streams: 0", "streams: 0, alter: {mouse.poze: [NED]}"), "no component that the gateway serves"),
         (("streams: 0", "streams: 0, alter: {mouse.pose: [NEDD]}"), "gateways.morse.alter: unknown frame"),
         (

@@ -110,12 +110,14 @@ class GatewaySettings(ComponentSettings):
     """The settings of each gateway: the robots that it serves, and who starts its process.
 
     On board of each of these is a client of the run, `NAME-ROBOT`, with dots as dashes, which hears the robot's sensors
-    and commands it; the client `NAME` is on board of none. `classes` chooses the class of a component, `ROBOT.CHANNEL`,
+    and commands it; the client `NAME` is on board of none. Programs know a robot by its label, if it has one, or by the
+    name in `names`. `classes` chooses the class of a component, `ROBOT.CHANNEL`,
     where its type has several; `alter` are the frames in which its numbers are given, in order.
     """
 
     robots: list[RobotSelector] = Field(default=["*"], max_length=limits.ENTITIES_MAX)
     launch: Literal["local", "manual"] = "local"
+    names: dict[str, Label] = Field(default={}, max_length=limits.ENTITIES_MAX)
     classes: dict[str, str] = Field(default={}, max_length=limits.ENTITIES_MAX)
     alter: dict[str, list[str]] = Field(default={}, max_length=limits.ENTITIES_MAX)
 
