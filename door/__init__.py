@@ -5,13 +5,14 @@
     with foosim.Simulation("deploy/table.yaml") as simulation:
         simulation.step({"red.goal": {"slide": 0.05, "spin": 0.0}})
 
-`foosim.components` has the base classes and types of your own components, `foosim.env` environments for learning.
+`foosim.components` has the base classes and types of your own components, `foosim.gateway` those of your own gateways,
+`foosim.env` environments for learning.
 Modules are imported at their first use.
 """
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from foosim import components, env
+    from foosim import components, env, gateway
     from foosim._capture import Capture, open_capture
     from foosim._rehearse import load_deployment, rehearse
     from foosim.client.client import Client, connect
@@ -41,6 +42,7 @@ __all__ = [
     "components",
     "connect",
     "env",
+    "gateway",
     "hear_replay",
     "load_deployment",
     "open_capture",
@@ -65,7 +67,7 @@ def __getattr__(name: str) -> object:
     import sys
     from importlib import import_module
 
-    if name in ("components", "env"):
+    if name in ("components", "env", "gateway"):
         return import_module(f"foosim.{name}")
     for module, names in _MODULES.items():
         if name in names:

@@ -12,20 +12,20 @@ from typing import Final
 import pytest
 
 import foosim
-from foosim import components, env
+from foosim import components, env, gateway
 from foosim.capture.mcap.checks import CaptureError
 from foosim.common.errors import BadValue
 from foosim.runtime.run_folder import NoRun
 
 ROOT: Final = Path(__file__).parents[2]
 TABLE: Final = ROOT / "deploy" / "table.yaml"
-DOOR: Final = {"foosim", "foosim.components", "foosim.env"}
+DOOR: Final = {"foosim", "foosim.components", "foosim.env", "foosim.gateway"}
 CODE: Final = re.compile(r"^```py(?:thon)?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 QUICK: Final = ("engine=pure", "substeps=1")
 TICKS: Final = 60
 
 
-@pytest.mark.parametrize("module", [foosim, components, env], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [foosim, components, env, gateway], ids=lambda module: module.__name__)
 def test_each_name_is_there(module: object) -> None:
     names: list[str] = module.__all__  # type: ignore[attr-defined]
     assert len(names) == len({*names})

@@ -2,7 +2,8 @@
 
 import asyncio
 import random
-from contextlib import suppress
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import pytest
@@ -10,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foosim.common.errors import Failed, Malformed
+from foosim.common.limits import YARP_BEHIND_MESSAGES_MAX
 from foosim.gateways.yarp import wire
-from foosim.gateways.yarp.ports import CARRIERS, NameClient
+from foosim.gateways.yarp.ports import CARRIERS, Link, NameClient, Port
 from tests.gateways.yarp_peers import SESSIONS, Rig, plain, replay, run, until
 
 SENT: list[list[Any]] = [
@@ -131,34 +133,50 @@ def test_the_name_server_answers_as_yarpserver_does() -> None:
     run(work)
 
 
+@asynccontextmanager
+async def hanging(rig: Rig, port: Port) -> AsyncIterator[list[Link]]:
+    """Have two readers of a port that read nothing, by tcp, which acknowledges, and by fast_tcp."""
+    hung: list[asyncio.StreamWriter] = []
+
+    def hang(stream: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(wire.magic(0))
+        hung.append(writer)
+
+    async with await asyncio.start_server(hang, "127.0.0.1", 0) as server:
+        for carrier in ("tcp", "fast_tcp"):
+            number = server.sockets[0].getsockname()[1]
+            await rig.names.request(f"register /{carrier} tcp 127.0.0.1 {number}")
+            await port.connect(f"{carrier}://{carrier}")
+        links = [port.links["/tcp"], port.links["/fast_tcp"]]
+        yield links
+        for writer in (*hung, *(link.writer for link in links)):
+            writer.transport.abort()
+
+
 def test_a_reader_that_hangs_loses_messages_and_another_one_none() -> None:
     async def work(rig: Rig) -> None:
         port = await rig.port("/w")
         heard: list[Any] = []
         await rig.port("/good", heard.append)
-        hung: list[asyncio.StreamWriter] = []
-
-        def hang(stream: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            writer.write(wire.magic(0))
-            hung.append(writer)
-
-        hanging = await asyncio.start_server(hang, "127.0.0.1", 0)
-        async with hanging:
-            number = hanging.sockets[0].getsockname()[1]
-            for name in ("/hanging/tcp", "/hanging/fast_tcp"):
-                await rig.names.request(f"register {name} tcp 127.0.0.1 {number}")
-            for place in ("/good", "tcp://hanging/tcp", "fast_tcp://hanging/fast_tcp"):
-                await port.connect(place)
-            count = 400
-            for index in range(count):
+        await port.connect("/good")
+        async with hanging(rig, port) as links:
+            for index in range(400):
                 port.write([index, b"x" * 30_000])
                 await until(lambda: len(heard) == index + 1)  # noqa: B023  # awaited here
-            assert [bottle[0] for bottle in heard] == list(range(count))
-            links = port.links
-            assert links["/good"].dropped == 0
-            assert links["/hanging/tcp"].dropped > 0 < links["/hanging/fast_tcp"].dropped
-            for writer in (*hung, *(link.writer for link in links.values())):
-                writer.transport.abort()
+            assert [bottle[0] for bottle in heard] == list(range(400))
+            assert port.links["/good"].dropped == 0
+            assert all(link.dropped > 0 for link in links)
+
+    run(work)
+
+
+def test_what_is_not_acknowledged_is_bounded() -> None:
+    async def work(rig: Rig) -> None:
+        port = await rig.port("/w")
+        async with hanging(rig, port) as links:
+            for _ in range(YARP_BEHIND_MESSAGES_MAX + 10):
+                port.write([0.5])
+            assert [link.dropped for link in links] == [10, 0]
 
     run(work)
 

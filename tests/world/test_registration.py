@@ -221,6 +221,6 @@ def test_an_import_error_of_a_package_is_in_the_message_of_each_type(site: Path)
         "module:Class), 'laps'"
     ]
     assert problems("rules={own: {kind: laps}}") == [
-        f"rules.own.kind: unknown rule of worlds; {why} (there are: catch, football, teleported, wind, zone, or any module:Class), "
-        "'laps'"
+        f"rules.own.kind: unknown rule of worlds; {why} (there are: catch, football, teleported, wind, zone, "
+        "or any module:Class), 'laps'"
     ]
