@@ -15,10 +15,7 @@ from foosim.world.components.view import View, WritableView
 
 
 class CatchSettings(RuleSettings):
-    """An entity with the tag `prey` is caught when one with the tag `hunter` is within `distance` of it.
-
-    The place of an entity is that of its first link.
-    """
+    """An entity with the tag `prey` is caught within `distance` of one with the tag `hunter`, by their first links."""
 
     prey: Tag
     hunter: Tag
