@@ -72,10 +72,14 @@ def test_files_have_the_bytes_of_morse_and_all_records(tmp_path: Path) -> None:
     assert text.endswith(f"\tvisible_objects = {seen['visible_objects']!r}\n")
 
 
-def test_a_full_disk_ends_one_file_and_is_reported_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("ticks", [30, 400])
+def test_a_full_disk_ends_one_file_and_is_reported_once(
+    ticks: int, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """At the end, where all of it is in the buffer, or before."""
     (tmp_path / "mouse.pose.txt").symlink_to("/dev/full")
     one = served(tmp_path, robots="[cat, mouse]")
-    one.rehearse(400)
+    one.rehearse(ticks)
     (message,) = [record.getMessage() for record in caplog.records if record.name == "log"]
     assert message == f"{tmp_path}/mouse.pose.txt is not written any more: No space left on device"
     counts = {full: its.count for full, its in one.run.components.items() if full in ("mouse.pose", "Cat/1.pose")}

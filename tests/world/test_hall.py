@@ -50,7 +50,7 @@ def problems(text: str, *sets: str) -> list[str]:
         ("robots.rover01.sensors.drive={kind: battery, rate: 1 Hz}",
          "robots.rover01.sensors: a name that is also one of rover01's actuators, 'drive'"),
         ("robots.base.heading=0 deg",
-         "robots.base: unknown key (there are: model, spare, tags, sensors, actuators, rules, x, y), 'heading'"),
+         "robots.base: unknown key (there are: model, spare, tags, label, sensors, actuators, rules, x, y), 'heading'"),
         ("scenery.goods-1.surface=floor",
          "scenery.goods-1.surface: a surface for free bodies, in a world without any, 'floor'"),
         ("hall.rover.radius=9 m", "hall.rover.radius: more than half of the hall's least side, '9 m'"),

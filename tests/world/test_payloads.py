@@ -37,7 +37,7 @@ CODECS = {
     name: codec_of(find_component(type_name, name)) for type_name in ("sensor", "actuator") for name in names(type_name)
 }
 """Of each registered kind."""
-PLAIN = {"joint_trajectory", "nearby", "semantic_camera"}
+PLAIN = {"collision", "joint_trajectory", "nearby", "semantic_camera"}
 """Kinds that are MessagePack."""
 SIZED = sorted(kind for kind, its in CODECS.items() if all(field.is_number for field in its.fields))
 
