@@ -45,6 +45,9 @@ class Gateway(Listener):
         """Yield problems of the settings of the gateway `name`, by the place below it."""
         yield from check_components(name, settings, deployment)
 
+    def draws(self, component: Component) -> bool:
+        return True
+
     async def open(self) -> str:
         """Listen; return where, for the log. Raises Refused."""
         return ""

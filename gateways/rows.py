@@ -94,8 +94,10 @@ class Component:
     row: Row
     fields: Fields | None = None
     """The newest reading, or the last command; None before the first."""
+    undrawn: Any = None
+    """The newest reading, where it is a picture for which no program has asked: its fields are made when one does."""
     time_ns: int = -1
-    """When that was sent, in simulated time."""
+    """When the newest reading was sent, in simulated time."""
     count: int = 0
     """How many readings have come, or commands were sent."""
     alterations: Sequence[Alteration] = ()
@@ -109,6 +111,11 @@ class Component:
     def is_out(self) -> bool:
         """Whether it is a sensor."""
         return self.row.out is not None
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether its readings are pictures, which cost time."""
+        return bool(self.settings.component_type.drawn_by)
 
 
 def reading(component: Component, value: Any, time_ns: int) -> Fields | None:
@@ -215,6 +222,8 @@ def _configurations(component: Component) -> Fields:
 
 
 def _local_data(component: Component) -> Fields:
+    if component.undrawn is not None:
+        component.fields, component.undrawn = reading(component, component.undrawn, component.time_ns), None
     if component.fields is None:
         raise Refused(f"{component.full} has measured nothing yet")
     return {"timestamp": component.time_ns / 1e9, **component.fields}

@@ -46,6 +46,10 @@ class Listener:
     def arrived(self, component: Component) -> None:
         """A reading has arrived: its fields are in `component.fields`, its time in `component.time_ns`."""
 
+    def draws(self, component: Component) -> bool:
+        """Whether a reading of a camera is drawn when it arrives; else it is when a service asks for it."""
+        return False
+
     def advanced(self) -> None:
         """The newest tick that is known, `Run.tick`, has changed."""
 
@@ -121,6 +125,10 @@ class Run:
         except Malformed as malformed:
             self._log.warning("%s: %s", component.full, malformed)
             return
+        if component.is_drawn and not any(listener.draws(component) for listener in self.listeners):
+            component.undrawn, component.time_ns = value, packet.sent_ns
+            return
+        component.undrawn = None
         fields = reading(component, value, packet.sent_ns)
         if fields is not None:
             self._deliver(component, fields, packet)

@@ -88,6 +88,9 @@ class Socket(LineServer):
             self.sync_port = await self.listen(address.host, many, partial(Trigger, self))
         return f"services at {Address(address.host, self.service_port)}, {len(self.ports)} streams"
 
+    def draws(self, component: Component) -> bool:
+        return bool(self._readers[component.full])
+
     def arrived(self, component: Component) -> None:
         readers = self._readers[component.full]
         if readers:

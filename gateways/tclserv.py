@@ -17,7 +17,7 @@ from foosim.common.addresses import Address, parse_address
 from foosim.common.errors import Refused
 from foosim.deployment.hosts import Listen
 from foosim.gateways.lines import Connection, LineServer
-from foosim.gateways.rows import MANAGER, services_of
+from foosim.gateways.rows import MANAGER, Component, services_of
 from foosim.gateways.run import Called
 from foosim.world.component_types.jobs import JobState
 from foosim.world.component_types.registry import gateway
@@ -43,6 +43,9 @@ class Tclserv(LineServer):
     clients: dict[str, Client]
     running: dict[str, Called]
     port = 0
+
+    def draws(self, component: Component) -> bool:
+        return False
 
     async def open(self) -> str:
         """Listen. Raises Refused where the port is not free."""

@@ -182,6 +182,9 @@ class Yarp(Gateway):
         for port in self.ports.values():
             yield from (Peer(who, port.name, port.counts[who]) for who in {*port.links, *port.sources.values()})
 
+    def draws(self, component: Component) -> bool:
+        return bool(self._outputs[component].links) or component in self._bottles
+
     def arrived(self, component: Component) -> None:
         fields = component.fields or {}
         port = self._outputs[component]

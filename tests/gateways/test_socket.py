@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import socket
+from base64 import b64decode
 from collections.abc import Iterator
 from contextlib import ExitStack
 from itertools import pairwise
@@ -332,3 +333,25 @@ def test_a_thousand_programs_are_served_and_an_id_is_used_once_at_a_time() -> No
 
     Served(TEXT, "morse", script).rehearse(60)
     assert answers == ['one FAILED "The request one is still running"', "one PREEMPTED"]
+
+
+def test_a_picture_is_drawn_for_a_reader_and_for_a_service_and_else_not() -> None:
+    drawn: list[bool] = []
+    size: list[int] = []
+
+    def script(served: Served) -> Iterator[int]:
+        program, camera = Program(served), served.run.components["mouse.eye"]
+        yield served.run.tick + 20
+        drawn.append(camera.fields is not None)
+        assert camera.undrawn is not None
+        _, data = program.call("mouse.eye", "get_local_data").split(" ", 1)
+        size.append(len(b64decode(json.loads(data)["image"])))
+        stream = program.stream("mouse.eye")
+        while not camera.count:
+            yield 0
+        size.append(len(b64decode(json.loads(stream.lines(1)[0])["image"])))
+
+    eye = "eye: {kind: camera, rate: 10 Hz, width: 16, height: 8, far: 10 m}"
+    Served(TEXT.replace("job: {kind: job", f"{eye}\n      job: {{kind: job"), "morse", script).rehearse(100)
+    assert drawn == [False]
+    assert size == [16 * 8 * 4, 16 * 8 * 4]
