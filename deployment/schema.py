@@ -240,7 +240,8 @@ class Deployment(WorldSpec):
 
     def profiles(self, network: Network | None = None) -> Profiles:
         """The settings of all links, of this network or of another one in its place."""
-        return Profiles(self.network if network is None else network, self.carriers(), self.console)
+        gateways = {client for name, its in self.gateways.items() for client in its.clients(name).values()}
+        return Profiles(self.network if network is None else network, self.carriers(), self.console, gateways)
 
     def launch_of(self, role: str) -> Literal["local", "manual", "systemd"]:
         """The launch of the process of a role."""

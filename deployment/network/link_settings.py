@@ -4,7 +4,7 @@ the defaults.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import lru_cache
@@ -42,10 +42,14 @@ def preset_radio(name: str) -> Radio:
 
 class Profiles:
     """The profiles of one network's links. `carriers` are the robots that endpoints are on board of, `console` is the
-    endpoint of the console, empty for none."""
+    endpoint of the console, empty for none. `gateways` are clients of gateways: no rule applies between one and the
+    robot that it is on board of."""
 
-    def __init__(self, network: Network, carriers: Mapping[str, str], console: str) -> None:
+    def __init__(
+        self, network: Network, carriers: Mapping[str, str], console: str, gateways: Collection[str] = ()
+    ) -> None:
         self.network = network
+        self._gateways = frozenset(gateways)
         self.console = console
         self._carriers = carriers
         self._by_channel = any(rule.channels is not None for rule in network.links)
@@ -77,6 +81,8 @@ class Profiles:
 
     def _rules(self, source: str, destination: str) -> Sequence[LinkRule]:
         """Return the rules that may apply to a pair; to the console's links only rules with its name apply."""
+        if not self._gateways.isdisjoint((source, destination)) and self.body(source) == self.body(destination):
+            return ()
         if self.console not in (source, destination):
             return self.network.links
         return [rule for rule in self.network.links if self.console in rule.selectors]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from base64 import b64decode
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from math import atan2, cos, hypot, pi, sin, tan
 from pathlib import Path
@@ -16,6 +17,7 @@ import yaml
 from foosim.common.errors import BadValue, Refused
 from foosim.deployment.loader import load_deployment
 from foosim.deployment.schema import Deployment
+from foosim.gateways.components import RADIO
 from foosim.gateways.frames import alterations, euler
 from foosim.gateways.rows import Component, Effect, Order, Row, call, command, reading
 from foosim.gateways.table import ROWS, row_of
@@ -25,6 +27,8 @@ from foosim.simulation.simulation import Simulation, read_for_stepping
 from foosim.world.earth import EarthOrigin, Geodesy
 from foosim.world.scene import from_rpy, rotate
 from tests.components.worlds import DEPLOY
+from tests.gateways.serving import Served
+from tests.gateways.test_socket import Program
 from tests.grip_yards import crane, crate, solids_text
 from tests.heads import folder, head
 from tests.kinematic_yard import yard_text
@@ -55,9 +59,8 @@ MOUSE: Final = {
 }
 
 
-@cache
-def yard() -> tuple[Deployment, Simulation]:
-    """A robot with each sensor, in two halves, that has driven along a curve towards another one, beside a fire."""
+def text_of_yard(**more: Any) -> str:
+    """Return a deployment of a robot with each sensor, in two halves, and of another one, beside a fire."""
     halves = (SENSORS[::2], SENSORS[1::2])
     cat = {
         "model": "differential_drive",
@@ -78,7 +81,13 @@ def yard() -> tuple[Deployment, Simulation]:
     robots["omni"] = {"model": "holonomic", "at": {"x": "-5 m"}, "actuators": {"go": {"kind": "go_within"}}}
     robots["mouse"] = MOUSE
     fire = {"model": "fire", "at": {"x": "1 m", "y": "6 m"}, "radius": "50 cm", "radius_max": "50 cm"}
-    deployment = load_deployment(yard_text(robots, origin=ORIGIN, objects={"fire": fire}), "yard.yaml")
+    return yard_text(robots, origin=ORIGIN, objects={"fire": fire}, **more)
+
+
+@cache
+def yard() -> tuple[Deployment, Simulation]:
+    """The yard once the robots have driven along a curve."""
+    deployment = load_deployment(text_of_yard(), "yard.yaml")
     simulation = Simulation(deployment)
     simulation.step({f"cat-{half}": {"linear": 0.6, "angular": 0.3} for half in (0, 1)}, ticks=100)
     return deployment, simulation
@@ -614,3 +623,39 @@ def test_a_component_type_outside_of_the_table_has_the_fields_of_its_payload() -
         assert reading(gap, simulation.readings["it", "gap"].value, 0) == {"distance": 3.0}
         assert (gap.row.morse, go.row.fields) == ("range", ("left", "right"))
         assert command(go, {"left": 0.1, "right": 0.2})[1] == {"left": 0.1, "right": 0.2}
+
+
+@pytest.mark.parametrize("nth", range(3))
+def test_each_class_makes_a_round_trip_through_the_socket(nth: int) -> None:
+    """Of the classes of a component type the first, the second and the third."""
+    classes: dict[str, str] = {}
+    for robot, its in yard()[0].robots.items():
+        for channel, one in (*its.sensors.items(), *its.actuators.items()):
+            rows = [row.morse for row in ROWS if row.kind == one.kind and not row.only]
+            if rows:
+                classes[f"{robot}.{channel}"] = rows[min(nth, len(rows) - 1)]
+    gateway = {"kind": "socket", "listen": "127.0.0.1:0", "streams": 0, "classes": classes}
+    heard: set[str] = set()
+
+    def script(served: Served) -> Iterator[int]:
+        program, components = Program(served), served.run.components
+        streams = {name: program.stream(name) for name in components}
+        yield served.run.tick + 10
+        for name, one in components.items():
+            if one.row.kind == RADIO:
+                continue
+            if one.is_out and (lines := streams[name].lines()):
+                last = json.loads(lines[-1])
+                assert [*last] == ["timestamp", *one.row.fields], name
+                assert last == json.loads(json.dumps({"timestamp": one.time_ns / 1e9, **(one.fields or {})})), name
+                heard.add(name)
+            elif not one.is_out:
+                streams[name].write(json.dumps(dict.fromkeys(one.row.fields, 0.5)) + "\n")
+                while not one.count:
+                    served.go_round()
+                assert one.fields == dict.fromkeys(one.row.fields, 0.5), name
+                heard.add(name)
+
+    served = Served(text_of_yard(gateways={"morse": gateway}), "morse", script)
+    served.rehearse(60)
+    assert heard == {name for name, one in served.run.components.items() if one.row.kind != RADIO}

@@ -16,7 +16,7 @@ from tests.gateways.test_socket import TEXT
 NAMED = (
     TEXT.replace("  cat:\n", "  red.cat:\n")
     .replace("[cat, mouse]", "[red.cat, mouse]")
-    .replace("links: [{id: air, from: morse-cat, to: morse-mouse, delay: 100 ms}]", "links: []")
+    .replace("from: morse-cat, to: morse-mouse", "from: '*', to: '*'")
 )
 
 
@@ -37,7 +37,9 @@ def test_each_robot_has_a_client_on_board_to_which_its_own_packets_go_past_the_n
     }
     profiles = deployment.profiles()
     assert profiles.find("red.cat", "morse-red-cat", "pose").rule == "on_board"
-    assert profiles.find("morse-red-cat", "morse-mouse", "radio").rule != "on_board"
+    assert profiles.find("morse-red-cat", "red.cat", "motion").rule == "on_board"
+    assert profiles.find("morse-red-cat", "morse-mouse", "radio").rule == "air"
+    assert profiles.find("red.cat", "morse-mouse", "pose").rule == "air"
     assert not deployment.clients["morse"].lockstep
 
 
