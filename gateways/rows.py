@@ -95,7 +95,7 @@ class Component:
     fields: Fields | None = None
     """The newest reading, or the last command; None before the first."""
     undrawn: Any = None
-    """The newest reading, where it is a picture for which no program has asked: its fields are made when one does."""
+    """The newest reading, where it is a picture without a reader: its fields are made at a request."""
     time_ns: int = -1
     """When the newest reading was sent, in simulated time."""
     count: int = 0

@@ -47,7 +47,7 @@ class Listener:
         """A reading has arrived: its fields are in `component.fields`, its time in `component.time_ns`."""
 
     def draws(self, component: Component) -> bool:
-        """Whether a reading of a camera is drawn when it arrives; else it is when a service asks for it."""
+        """Whether a reading of a camera is drawn when it arrives; else it is at the request of a service."""
         return False
 
     def advanced(self) -> None:
