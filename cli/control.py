@@ -32,7 +32,7 @@ def status(run: RunOption = None, json: JsonOption = False) -> None:
     for name, gateway in gateways.items():
         programs = gateway["programs"]
         rate_hz = sum(one["hz"] for one in programs)
-        print(f"gateway {name}, {gateway['kind']}: {len(programs)} programs, {rate_hz:.0f} messages/s")
+        print(f"gateway {name}: {gateway['at']}, {len(programs)} connections, {rate_hz:.0f} messages/s")
 
 
 @app.command()

@@ -23,5 +23,6 @@ def gateway(
     """
     from foosim.cli.up import app as up
 
-    words = [file, "--set", f"gateways.{kind}={{kind: {kind}}}", *context.args]
+    name = kind.rpartition(":")[2].lower()
+    words = [file, "--set", f"gateways.{name}={{kind: '{kind}'}}", *context.args]
     typer.main.get_command(up).main(args=words, prog_name="foosim up", standalone_mode=False)

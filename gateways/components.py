@@ -23,8 +23,10 @@ def send_radio(component: Component, to: str, data: Any) -> Order:
 
 
 def robots_of(deployment: Deployment, settings: GatewaySettings) -> dict[str, str]:
-    """Return the robots that a gateway serves, by the name that programs know."""
-    return {settings.names.get(robot) or label_of(deployment, robot): robot for robot in settings.robots}
+    """Return the robots that a gateway serves, by the name that programs know; in names of MORSE a dot is before a
+    component, so in those of robots it is `_`."""
+    names = {robot: settings.names.get(robot) or label_of(deployment, robot) for robot in settings.robots}
+    return {name.replace(".", "_"): robot for robot, name in names.items()}
 
 
 def radios(deployment: Deployment, robot: str, label: str) -> Iterator[Component]:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Final, NamedTuple
 from foosim.common.errors import BadValue, UnknownName
 from foosim.common.finding import Finding
 from foosim.deployment.schema import Deployment
-from foosim.gateways.components import components_of
+from foosim.gateways.components import components_of, robots_of
 from foosim.gateways.rows import Component
 from foosim.gateways.run import Listener, Run
 from foosim.gateways.supervision import Supervision
@@ -74,6 +74,10 @@ def check_components(name: str, settings: GatewaySettings, deployment: Deploymen
         except BadValue as bad:
             yield Finding(("gateways", name, section), bad.problem, bad.value, bad.nearest)
             return
+    known = robots_of(deployment, settings)
+    if doubled := [robot for robot in settings.robots if robot not in known.values()]:
+        what = "two robots with one name for programs; `names` gives other ones"
+        yield Finding(("gateways", name), what, doubled[0], at="key")
     for key in settings.names:
         if key not in settings.robots:
             unknown = UnknownName("no robot that the gateway serves", key, settings.robots)

@@ -31,6 +31,8 @@ class LineServer(Gateway):
 
     async def listen(self, host: str, ports: range, make: Callable[[], asyncio.Protocol]) -> int:
         """Listen at the first free one of some ports; return it. Raises Refused where none is."""
+        if not ports:
+            raise Refused(f"{self.run.name}: no port is left up to 65535")
         family = sockets.AF_INET6 if ":" in host else sockets.AF_INET
         for port in ports:
             listener = sockets.socket(family)

@@ -11,7 +11,7 @@ import resource
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -90,6 +90,7 @@ class GatewayProcess:
         self._timer: asyncio.TimerHandle | None = None
         self._turned = asyncio.Event()
         """Set after each turn."""
+        self._report: dict[str, Any] = {}
         self._is_over = False
         self._failure: BaseException | None = None
 
@@ -115,6 +116,8 @@ class GatewayProcess:
         await self._until(lambda: all(shell.core.deployment is not None for shell in self._shells.values()))
         where = await gateway.open()
         gateway.log.info("%s serves %d robots: %s", self._name, len(run.robots), where)
+        self._report = {"kind": gateway.settings.kind, "robots": [*run.robots], "at": where, "programs": []}
+        self._write_report()
         for robot, client in run.clients.items():
             self._endpoints[client].join(gateway, robot)
         tasks = [asyncio.create_task(supervision.follow()), asyncio.create_task(self._report_peers(gateway))]
@@ -190,10 +193,13 @@ class GatewayProcess:
             rates = [(one.messages - known.get(one[:2], 0)) / REPORT_S for one in peers]
             known = {one[:2]: one.messages for one in peers}
             found = [{"name": one.name, "what": one.what, "hz": rate} for one, rate in zip(peers, rates, strict=True)]
-            with suppress(OSError):  # the console shows the last one
-                self._folder.write_gateway(
-                    self._name, {"kind": gateway.settings.kind, "robots": [*gateway.run.robots], "programs": found}
-                )
+            self._report = {**self._report, "programs": found}
+            self._write_report()
+
+    def _write_report(self) -> None:
+        with suppress(OSError):  # the console shows the last one
+            if self._folder is not None:
+                self._folder.write_gateway(self._name, self._report)
 
 
 def raise_descriptors() -> None:

@@ -171,7 +171,7 @@ def call(component: Component, service: str, parameters: list[Any]) -> Any:
     return checked(service, partial(its, component), parameters)
 
 
-WRONG_TYPES: Final = (TypeError, ValueError, LookupError, AttributeError)
+WRONG_TYPES: Final = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError)
 """What functions of services raise for parameters of wrong types."""
 
 

@@ -156,20 +156,20 @@ class Run:
     def command(self, component: Component, given: Mapping[str, Any]) -> None:
         """Send a command by its fields; omitted ones keep their values. Raises Refused."""
         fields, numbers = command(component, given)
+        if component.row.kind == RADIO:
+            packet = self._radio(component, fields)
+        else:
+            payload = self._encoder.actuator(component.robot, component.channel).pack(numbers)
+            packet = Packet(component.robot, component.channel, payload)
+        self._send(self.clients[component.robot], packet)
         component.fields = fields
         component.count += 1
-        if component.row.kind == RADIO:
-            self._radio(component, fields)
-            return
-        taker = self._encoder.actuator(component.robot, component.channel)
-        self._send(self.clients[component.robot], Packet(component.robot, component.channel, taker.pack(numbers)))
 
-    def _radio(self, component: Component, fields: Fields) -> None:
+    def _radio(self, component: Component, fields: Fields) -> Packet:
         to = fields["to"]
-        if to not in self.robots:
+        if not isinstance(to, str) or to not in self.robots:
             raise Refused(f"{component.full}: no robot {to!r} has a radio here (valid are: {', '.join(self.robots)})")
-        packet = Packet(self.clients[self.robots[to]], RADIO, encode_json(fields["data"]))
-        self._send(self.clients[component.robot], packet)
+        return Packet(self.clients[self.robots[to]], RADIO, encode_json(fields["data"]))
 
     def measured(self, component: Component, fields: Fields) -> None:
         """Enter what a real sensor in place of this one has measured into the capture, by its row's fields."""
@@ -229,9 +229,9 @@ class Run:
         if jobs is None:
             jobs = self._jobs[component.full] = Jobs(self.deployment, client, component.robot, component.channel)
             jobs.hear(self._reports.samples)
+        called = Called(component, jobs.call(**numbers), order.answer, ended)
         component.fields, component.status = fields, "Transit"
         self._called += self._paused.pop(component.full, (None, []))[1]
-        called = Called(component, jobs.call(**numbers), order.answer, ended)
         self._called.append(called)
         self._look_at_jobs()
         return called

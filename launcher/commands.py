@@ -39,7 +39,7 @@ KINDS: Final = {
     VHUB: Kind((*ROLE, "vhub"), "unless refused", True, "lost by deadlines of the supervisor, and alive"),
     "node": Kind((*ROLE, "node"), "always", False, "lost by deadlines of the supervisor, and alive"),
     "player": Kind((*ROLE, "player"), "after a signal", False, "deadlines of the vHub, which end the run"),
-    "gateway": Kind((*ROLE, "gateway"), "unless refused", False, "none: the run continues without it"),
+    "gateway": Kind((*ROLE, "gateway"), "unless refused", True, "none: the run continues without it"),
 }
 """By role: supervisor, vHub, any node, any player, any gateway."""
 

@@ -93,7 +93,8 @@ class Up:
         self._console = ConsoleChild(self.folder, display, console)
         self._not_home = ""
         """Why the capture was not fetched from the machine on which it was written."""
-        self._interrupts = 0
+        self._interrupts, self._gateways = 0, dict[str, str]()
+        """Where gateways listen, as shown."""
         self._ending_s = self._lost_s = 0.0
         self._end_requested = False
         """Whether the supervisor was requested to end the run."""
@@ -317,6 +318,10 @@ class Up:
             child.left_early = not (
                 self._stopped.intersection(self._roles(child.name)) or child.name in self._launcher.units
             )
+        for name, gateway in self.folder.gateways().items():
+            if self._gateways.get(name) != gateway["at"]:
+                self._gateways[name] = gateway["at"]
+                self.display.say(f"gateway {name}: {gateway['at']}")
         self._start_wanted(status["starts"])
         if not self._has_ended and not self._ending_s:
             self._restart_ended(now_s, has_status=True)
@@ -482,7 +487,8 @@ class Up:
 
     def _ends_run(self, child: Child) -> bool:
         """Whether the run cannot continue without this child, which has ended."""
-        if child.name in self.plan.deployment.gateways:
+        deployment = self.plan.deployment
+        if child.name in deployment.gateways and not deployment.clients[child.name].lockstep:
             return False
         return (child.exit_code != DONE or child.left_early) and not self._comes_back(child)
 

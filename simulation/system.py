@@ -99,6 +99,24 @@ class People:
             self._later(again_ns, lambda: self._send(identity, channel, who, payload, again_ns))
 
 
+def _untriggered(core: ClientCore) -> Callable[[int], None]:
+    """Return the turn of a gateway without a program that triggers steps."""
+
+    has_joined = False
+
+    def turn(now_ns: int) -> None:
+        nonlocal has_joined
+        if core.deployment is not None and not has_joined:
+            has_joined = True
+            rate_hz = core.deployment.clients[core.name].rate_hz
+            assert rate_hz is not None, "the client of a gateway in lockstep has a rate"
+            core.join(core.deployment.ticks(rate_hz), ())
+        if core.go is not None:
+            core.done(())
+
+    return turn
+
+
 @mypyc_attr(allow_interpreted_subclasses=True)
 class System:
     """All processes of one deployment. Build it, then `run`."""
@@ -450,11 +468,13 @@ class System:
         heappush(self._timers, (self.bus.now_ns + after_ns, self._boots, action))
 
     def _enter_clients(self) -> None:
-        """Add the players of the deployment and the lockstep clients of the rehearsal."""
-        for name, player in sorted(self.supervisor.state.deployment.players.items()):
+        """Add the players of the deployment, the lockstep clients of the rehearsal, and those of gateways."""
+        deployment = self.supervisor.state.deployment
+        for name, player in sorted(deployment.players.items()):
             assert player.lockstep, "a rehearsal has lockstep players only"
             self._enter_player(name, "boot")
-        for name, client in sorted(self.settings.clients.items()):
+        gateways = {name: _untriggered for name in deployment.gateways if deployment.clients[name].lockstep}
+        for name, client in sorted((gateways | dict(self.settings.clients)).items()):
             core = ClientCore(name, "boot", self.now_of(name))
             self.enter(name, core, client(core), channels.CLIENT_READS)
 

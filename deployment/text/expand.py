@@ -264,7 +264,7 @@ class Expansion:
                     made[client_on(name, robot.value)] = {"on": robot}, robot.place
             for one, (values, at) in made.items():
                 if one in found.values:
-                    self._report.add(at, path[:2], "it makes a client of a name that there is", one)
+                    self._report.add(at, path[:2], "it makes a client with the name of one that is declared", one)
                 found.values[one], found.keys[one] = Fields(at, dict(values), dict.fromkeys(values, at)), at
         return whole, found if isinstance(clients, Fields | None) else clients
 

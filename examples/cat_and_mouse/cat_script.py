@@ -6,7 +6,10 @@ It sends a new motion when what the cameras see has changed, as the tutorial's d
 import sys
 import time
 
-from pymorse import Morse
+import pymorse
+
+# On Python 3.8 to 3.11 a program of pymorse 1.4 does not end without this.
+pymorse.Component.__dir__ = lambda self: sorted({*vars(self), *vars(type(self))})
 
 MOTIONS = {
     (True, True): {"v": 2.0, "w": 0.0},
@@ -22,12 +25,12 @@ def is_seen_by(camera):
     return any(thing["name"] == "MOUSE" for thing in camera.last()["visible_objects"])
 
 
-with Morse(port=int(sys.argv[1]) if len(sys.argv) > 1 else 4000) as simulation:
+with pymorse.Morse(port=int(sys.argv[1]) if len(sys.argv) > 1 else 4000) as simulation:
     cat = simulation.cat
     # `last` opens a stream, and has nothing to return at once: wait for a first message of each.
     cat.cameraL.get(), cat.cameraR.get()
     last = None
-    while True:  # until Ctrl-C, or until the simulation ends
+    while True:  # until Ctrl-C
         seen = is_seen_by(cat.cameraL), is_seen_by(cat.cameraR)
         if seen != last:
             cat.motion.publish(MOTIONS[seen])

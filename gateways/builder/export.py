@@ -143,6 +143,8 @@ class Builder:
         environments = [thing for thing in self.things if thing["category"] == "environment"]
         if len(environments) != 1 and not self.problems:
             self.say(self.script, f"a script makes one Environment; this one has made {len(environments)}")
+        if not any(thing["category"] == "robots" for thing in self.things) and not self.problems:
+            self.say(self.script, "a script makes robots; this one has made none")
         makers = {"robots": self.robot, "objects": self.object, "zones": self.zone, "environment": self.environment}
         for category in ("environment", "zones", "robots", "objects"):
             for thing, name in [(thing, name) for thing, name in self.children(None) if thing["category"] == category]:

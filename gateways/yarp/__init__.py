@@ -29,6 +29,7 @@ from foosim.gateways.supervision import Supervision
 from foosim.gateways.yarp.name_server import NameServer, name_server
 from foosim.gateways.yarp.ports import NameClient, Port, Receive
 from foosim.gateways.yarp.wire import image
+from foosim.world.component_types.payloads import as_float
 from foosim.world.component_types.registry import gateway
 from foosim.world.component_types.settings import GatewaySettings
 
@@ -52,7 +53,9 @@ class YarpSettings(GatewaySettings):
     prefix: PortName = "/morse"
     timestamp: bool = True
     ports: dict[str, PortName] = Field(default={}, max_length=limits.ENTITIES_MAX)
-    bottles: dict[PortName, list[str] | PortName] = Field(default={}, max_length=limits.ENTITIES_MAX)
+    bottles: dict[PortName, Annotated[list[str], Field(min_length=1)] | PortName] = Field(
+        default={}, max_length=limits.ENTITIES_MAX
+    )
 
     def numbers(self, port: str) -> list[str]:
         """Return the numbers of a bottle; of one that is that of another port, of that one. Raises BadValue."""
@@ -96,7 +99,8 @@ class Bottle:
         if self._fresh != self.components:
             return None
         self._fresh.clear()
-        return [item.component.fields[item.field] / item.factor for item in self.items if item.component.fields]
+        fields = [(item.component.fields or {})[item.field] for item in self.items]
+        return [as_float(one) / item.factor for one, item in zip(fields, self.items, strict=True)]
 
     def take(self, run: Run, values: list[Any]) -> None:
         """Command the actuators, enter the states that were measured. Raises Refused."""
@@ -193,8 +197,13 @@ class Yarp(Gateway):
         elif port.links:
             stamp = [component.time_ns / 1e9] if self.settings.timestamp else []
             port.write(stamp + [one for value in fields.values() for one in items_of(value)])
-        for port, bottle in self._bottles.get(component, ()):
-            values = bottle.arrived(component)
+        for port, bottle in tuple(self._bottles.get(component, ())):
+            try:
+                values = bottle.arrived(component)
+            except TypeError:
+                self.log.error("%s is not sent: a field of %s is no number", port.name, component.full)
+                self._bottles[component].remove((port, bottle))
+                continue
             if values is not None:
                 port.write(values)
 

@@ -28,9 +28,9 @@ def test_the_client_in_c_drives_a_robot(tmp_path: Path) -> None:
     def script(served: Served) -> Iterator[int]:
         gateway = served.gateway
         assert isinstance(gateway, Socket)
-        pose, motion = (served.run.components[name] for name in ("Cat.001.Pose", "Cat.001.motion"))
+        pose, motion = (served.run.components[name] for name in ("Cat_001.Pose", "Cat_001.motion"))
 
-        for words in (("Cat.001.Pose", "dog.motion", "1"), (pose.full, motion.full, "-1.0")):
+        for words in (("Cat_001.Pose", "dog.motion", "1"), (pose.full, motion.full, "-1.0")):
             command = [str(program), "127.0.0.1", str(gateway.service_port), *words]
             with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
                 while process.poll() is None and motion.full not in [one.what for one in gateway.connections]:

@@ -45,13 +45,13 @@ def test_a_viewer_sees_topics_and_readings_and_commands_a_robot(
                 message = json.loads(viewer.recv())
                 assert message["op"] == "advertise"
                 advertised.update({one["topic"]: one["id"] for one in message["channels"]})
-            subscription = {"id": 7, "channelId": advertised["/Cat.001.Pose"]}
+            subscription = {"id": 7, "channelId": advertised["/Cat_001.Pose"]}
             viewer.send(json.dumps({"op": "subscribe", "subscriptions": [subscription]}))
-            channel = {"id": 3, "topic": "/Cat.001.motion", "encoding": "json", "schemaName": ""}
+            channel = {"id": 3, "topic": "/Cat_001.motion", "encoding": "json", "schemaName": ""}
             viewer.send(json.dumps({"op": "advertise", "channels": [channel]}))
             for command in (b"nothing", b'{"v": 1.0, "w": 0.0}'):
                 viewer.send(struct.pack("<BI", PUBLISHED, 3) + command)
-            while served.run.components["Cat.001.motion"].fields is None:
+            while served.run.components["Cat_001.motion"].fields is None:
                 served.go_round()
             peers.extend(one[:2] for one in gateway.peers())
             yield served.run.tick + 100
@@ -65,12 +65,12 @@ def test_a_viewer_sees_topics_and_readings_and_commands_a_robot(
     folder_on_path(tmp_path, monkeypatch)
     install(tmp_path, "viewers", "1.0", "live")
     Served(TEXT, "morse", script).rehearse(200)
-    assert {"/Cat.001.Pose", "/mouse.pose", "/tf"} <= {*advertised}
-    assert peers[0][1] == "/Cat.001.Pose"
+    assert {"/Cat_001.Pose", "/mouse.pose", "/tf"} <= {*advertised}
+    assert peers[0][1] == "/Cat_001.Pose"
     (before_ns, before), (after_ns, after) = readings[-2:]
     assert after_ns - before_ns == 20_000_000
     assert after["time"] == after_ns / 1e9
     assert after["x"] > before["x"]
     assert [record.getMessage() for record in caplog.records if record.name == "morse"] == [
-        "Cat.001.motion: Expecting value: line 1 column 1 (char 0)"
+        "Cat_001.motion: Expecting value: line 1 column 1 (char 0)"
     ]

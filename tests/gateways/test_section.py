@@ -11,6 +11,8 @@ from foosim.deployment.loader import load_deployment
 from foosim.deployment.processes import SHAPES, processes_of
 from foosim.deployment.schema import Deployment
 from foosim.protocol.identity import identities_of, of_process
+from foosim.simulation.run import rehearse
+from foosim.simulation.simulation import Simulation
 from tests.gateways.test_socket import TEXT
 
 NAMED = (
@@ -49,6 +51,14 @@ def test_a_trigger_makes_the_own_client_one_in_lockstep() -> None:
     assert [*deployment.clients] == ["morse", "morse-mouse"]
 
 
+def test_without_the_gateway_s_process_steps_are_not_awaited() -> None:
+    text = NAMED.replace("streams: 0", "streams: 0, sync: {rate: 20 Hz}")
+    assert rehearse(text, "x.yaml", 20).json["ticks"] == 20
+    with Simulation(load_deployment(text, "x.yaml"), network=True) as simulation:
+        simulation.step(ticks=20)
+        assert simulation.tick == 20
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 def test_it_has_a_process_of_its_own_with_the_certificates_of_its_clients(shape: str) -> None:
     deployment = loaded()
@@ -68,9 +78,13 @@ def test_it_has_a_process_of_its_own_with_the_certificates_of_its_clients(shape:
         (("streams: 0", "streams: -1"), "gateways.morse.streams: "),
         (("streams: 0", "streams: 0, sync: {rate: 3 Hz}"), "clients.morse.rate: not a whole number of ticks of 10 ms"),
         (("streams: 0", "streams: 0, sync: {}"), "gateways.morse.sync: missing key, 'rate'"),
-        (("nodes:", "clients: {morse-mouse: {}}\nnodes:"), "gateways.morse: it makes a client of a name that there is"),
+        (
+            ("nodes:", "clients: {morse-mouse: {}}\nnodes:"),
+            "gateways.morse: it makes a client with the name of one that is declared",
+        ),
         (("streams: 0", "streams: 0, classes: {mouse.pose: Pos}"), "nearest is 'Pose'"),
         (("streams: 0", "streams: 0, classes: {mouse.poze: Pose}"), "no component that the gateway serves"),
+        (("streams: 0", "streams: 0, names: {mouse: Cat.001}"), "two robots with one name for programs"),
         (("streams: 0", "streams: 0, names: {mous: m}"), "no robot that the gateway serves"),
         (("streams: 0", "streams: 0, alter: {mouse.poze: [NED]}"), "no component that the gateway serves"),
         (("streams: 0", "streams: 0, alter: {mouse.pose: [NEDD]}"), "gateways.morse.alter: unknown frame"),

@@ -93,7 +93,7 @@ def test_commands_move_robots_and_readings_have_their_times_and_rates() -> None:
 
     def script(served: Served) -> Iterator[int]:
         program = Program(served)
-        pose, motion = program.stream("Cat.001.Pose"), program.stream("Cat.001.motion")
+        pose, motion = program.stream("Cat_001.Pose"), program.stream("Cat_001.motion")
         motion.write('{"v": 9.0}\n{"v": 1.0, "w": 0.0}\n')  # of lines that come at once the last one counts
         there = program.ask("mouse.go", "goto", 2.0, 0.0, 0.0, 0.1, 1.0)
         yield served.run.tick + 300
@@ -150,9 +150,9 @@ def test_a_stop_leaves_a_job_without_an_answer_until_it_goes_on_or_is_called_off
 
 
 ANSWERS = {
-    "q1 simulation list_robots\n": 'q1 SUCCESS ["Cat.001", "mouse"]',
-    "q2 \t simulation   list_robots  []  \n": 'q2 SUCCESS ["Cat.001", "mouse"]',
-    "q3 Cat.001.motion set_speed [0.0, 0.0]\n": "q3 SUCCESS",
+    "q1 simulation list_robots\n": 'q1 SUCCESS ["Cat_001", "mouse"]',
+    "q2 \t simulation   list_robots  []  \n": 'q2 SUCCESS ["Cat_001", "mouse"]',
+    "q3 Cat_001.motion set_speed [0.0, 0.0]\n": "q3 SUCCESS",
     "q4 simulation nope []\n": 'q4 FAILED "The request nope has not been registered in Socket service manager"',
     "q5 nobody stop\n": 'q5 FAILED "The request stop has not been registered in Socket service manager"',
     "q6\n": 'q6 FAILED "Malformed request! "',
@@ -160,11 +160,11 @@ ANSWERS = {
     "q8 time sleep [-1.0]\n": 'q8 FAILED "sleep takes 0 to 1e+06 simulated seconds, not -1.0"',
 }
 BEGINNINGS = {
-    "w1 Cat.001.motion set_speed [1.0]\n": "Socket service manager: wrong # of parameters for service set_speed. ",
-    "w2 Cat.001.motion set_speed\n": "Socket service manager: parameters expected for service set_speed! ",
-    'w3 Cat.001.motion set_speed ["a", 0.0]\n': "Socket service manager: wrong parameter type for service set_speed. ",
-    "w4 Cat.001.motion set_speed {}\n": "Invalid request syntax: error while parsing the parameters: {}. ",
-    "w5 Cat.001.motion set_speed [1\n": "Invalid request syntax: error while parsing the parameters: [1. ",
+    "w1 Cat_001.motion set_speed [1.0]\n": "Socket service manager: wrong # of parameters for service set_speed. ",
+    "w2 Cat_001.motion set_speed\n": "Socket service manager: parameters expected for service set_speed! ",
+    'w3 Cat_001.motion set_speed ["a", 0.0]\n': "Socket service manager: wrong parameter type for service set_speed. ",
+    "w4 Cat_001.motion set_speed {}\n": "Invalid request syntax: error while parsing the parameters: {}. ",
+    "w5 Cat_001.motion set_speed [1\n": "Invalid request syntax: error while parsing the parameters: [1. ",
     "w6 time sleep [[]]\n": "Socket service manager: wrong parameter type for service sleep. ",
 }
 
@@ -198,8 +198,8 @@ def test_the_radio_takes_its_time_and_a_sleep_simulated_time() -> None:
     def script(served: Served) -> Iterator[int]:
         program = Program(served)
         inbox, begun = program.stream("mouse.received"), served.run.tick
-        assert program.call("Cat.001.radio", "send", "mouse", {"at": [1, 2.5]}) == "SUCCESS"
-        assert "no robot 'dog' has a radio here" in program.call("Cat.001.radio", "send", "dog", 1)
+        assert program.call("Cat_001.radio", "send", "mouse", {"at": [1, 2.5]}) == "SUCCESS"
+        assert "no robot 'dog' has a radio here" in program.call("Cat_001.radio", "send", "dog", 1)
         sleep = program.ask("time", "sleep", 0.5)
         while not program.answer(sleep):
             yield 0
@@ -209,7 +209,7 @@ def test_the_radio_takes_its_time_and_a_sleep_simulated_time() -> None:
 
     result = Served(TEXT, "morse", script).rehearse(200)
     assert slept == [pytest.approx(0.5, abs=0.011)]
-    assert received[0]["from"] == "Cat.001"
+    assert received[0]["from"] == "Cat_001"
     assert received[0]["data"] == {"at": [1, 2.5]}
     assert result.json["packets"]["dropped"] == 0
 
@@ -248,7 +248,7 @@ def test_a_reader_that_hangs_costs_no_other_one_a_message() -> None:
     counts: list[int] = []
 
     def script(served: Served) -> Iterator[int]:
-        gateway, component = served.gateway, served.run.components["Cat.001.Pose"]
+        gateway, component = served.gateway, served.run.components["Cat_001.Pose"]
         assert isinstance(gateway, Socket)
         program = Program(served)
         reader, hanging = program.stream(component.full), program.stream(component.full)
@@ -275,7 +275,7 @@ def test_garbage_ends_nothing_else(seed: int) -> None:
     pieces = [
         b"id1 ",
         b"cat",
-        b"Cat.001.motion ",
+        b"Cat_001.motion ",
         b"set_speed ",
         b"[1.0, ",
         b"\xff\x00",
@@ -306,7 +306,7 @@ def test_garbage_ends_nothing_else(seed: int) -> None:
         yield 0
 
     result = Served(TEXT, "morse", script).rehearse(60)
-    assert good == ['SUCCESS ["Cat.001", "mouse"]']
+    assert good == ['SUCCESS ["Cat_001", "mouse"]']
     assert not result.json["failed"]
 
 

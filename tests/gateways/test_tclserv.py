@@ -14,22 +14,22 @@ from tests.gateways.test_socket import TEXT as SOCKET
 
 TEXT = SOCKET.replace("{kind: socket, listen: '127.0.0.1:0', streams: 0}", "{kind: tclserv, listen: '127.0.0.1:0'}")
 ANSWERS = {
-    "RQST ::Cat.001.motion::set_speed 0.5 0": ["OK 0", "0 ::Cat.001.motion::set_speed TERM OK"],
+    "RQST ::Cat_001.motion::set_speed 0.5 0": ["OK 0", "0 ::Cat_001.motion::set_speed TERM OK"],
     "RQST ::mouse.go::get_status": ["OK 1", "1 ::mouse.go::get_status TERM OK Stop"],
     "RQST ::mouse.go::get_configurations": [
         "OK 2",
         "2 ::mouse.go::get_configurations TERM OK configurations  {object_to_robot {rotation "
         "{{1.0 0.0 0.0} {0.0 1.0 0.0} {0.0 0.0 1.0}} translation {0.0 0.0 0.0}}}",
     ],
-    "RQST ::Cat.001.motion::stop now": ["ERROR 1 wrong # args"],
-    "RQST ::Cat.001.motion::set_speed": ["ERROR 1 wrong # args"],
-    "RQST ::Cat.001.motion::set_speed fast 0": ["ERROR 1 wrong type in args"],
-    "RQST ::Cat.001.motion::fly 1": ['ERROR 1 invalid command name \\"flySend\\"'],
+    "RQST ::Cat_001.motion::stop now": ["ERROR 1 wrong # args"],
+    "RQST ::Cat_001.motion::set_speed": ["ERROR 1 wrong # args"],
+    "RQST ::Cat_001.motion::set_speed fast 0": ["ERROR 1 wrong type in args"],
+    "RQST ::Cat_001.motion::fly 1": ['ERROR 1 invalid command name \\"flySend\\"'],
     "RQST": ['ERROR 1 invalid command name \\"Send\\"'],
     "ABORT 17": ["ERROR 1 no running request 17"],
     "REPLYTO 9": ["ERROR 1 no client 9"],
     "cs::lsmbox": [
-        "OK Cat.001.radio Cat.001.received Cat.001.Pose Cat.001.motion mouse.radio mouse.received mouse.pose mouse.go"
+        "OK Cat_001.radio Cat_001.received Cat_001.Pose Cat_001.motion mouse.radio mouse.received mouse.pose mouse.go"
     ],
     "info commands mouse.radio::*": [
         "OK "
@@ -117,7 +117,7 @@ def test_garbage_ends_nothing_else(seed: int, caplog: pytest.LogCaptureFixture) 
         *(
             b"HELLO\n",
             b"RQST ",
-            b"::Cat.001.motion::",
+            b"::Cat_001.motion::",
             b"::::",
             b"set_speed ",
             b"1e999 ",

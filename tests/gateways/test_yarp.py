@@ -121,18 +121,18 @@ def test_ports_have_the_names_bottles_and_services_of_morse() -> None:
     def script(served: Served) -> Iterator[int]:
         program = Program(served)
         programs.append(program)
-        program.hear("/pose", "/morse/Cat001/Pose/out")
-        for component in ("Cat.001.motion", "mouse.go"):
+        program.hear("/pose", "/morse/Cat_001/Pose/out")
+        for component in ("Cat_001.motion", "mouse.go"):
             program.hear(f"/{component}", f"/morse/services/{component}/reply")
-        program.write("/morse/Cat001/motion/in", [1.0, 0.0])
+        program.write("/morse/Cat_001/motion/in", [1.0, 0.0])
         program.write("/morse/services/mouse.go/request", [7, "mouse.go", "goto", "[2.0, 0.0, 0.0, 0.1]"])
-        requests = "/morse/services/Cat.001.motion/request"
-        program.write(requests, [8, "Cat.001.motion", "fly"])
-        program.write(requests, [9, "Cat.001.motion", "set_speed", "__import__('os')"])
+        requests = "/morse/services/Cat_001.motion/request"
+        program.write(requests, [8, "Cat_001.motion", "fly"])
+        program.write(requests, [9, "Cat_001.motion", "set_speed", "__import__('os')"])
         program.write(requests, [10])
         yield served.run.tick + 300
-        program.write(requests, [11, "Cat.001.motion", "stop"])
-        program.write(requests, [12, "Cat.001.motion", "set_speed", [2.0, 0.0]])
+        program.write(requests, [11, "Cat_001.motion", "stop"])
+        program.write(requests, [12, "Cat_001.motion", "set_speed", [2.0, 0.0]])
         yield served.run.tick + 50
         program.read()
 
@@ -145,7 +145,7 @@ def test_ports_have_the_names_bottles_and_services_of_morse() -> None:
     assert len(first) == 7  # the time, and x, y, z, yaw, pitch, roll
     assert last[0] - first[0] == pytest.approx(0.02)
     assert heard["/mouse.go"] == [["7 SUCCESS Arrived"]]
-    replies = [reply for (reply,) in heard["/Cat.001.motion"]]
+    replies = [reply for (reply,) in heard["/Cat_001.motion"]]
     assert [reply.split()[:2] for reply in replies] == [
         ["8", "FAILED"], ["9", "FAILED"], ["10", "FAILED"], ["11", "SUCCESS"], ["12", "SUCCESS"],
     ]  # fmt: skip

@@ -54,7 +54,7 @@ def test_the_simulator_is_supervised_and_a_killed_gateway_comes_back(house: Hous
     house.start("foosim", "up", path, *ONE, "--no-capture")
     folder = house.live()
     with connected(folder) as services:
-        assert call(services, "communication", "distance_and_view", "Cat.001", "mouse") == [pytest.approx(4.0), True]
+        assert call(services, "communication", "distance_and_view", "Cat_001", "mouse") == [pytest.approx(4.0), True]
         assert call(services, "simulation", "set_object_position", "mouse", [-3.0, 5.0, 0.0]) is None
         wait_for("the mouse", lambda: call(services, "simulation", "get_scene_objects")["mouse"][1] == [-3.0, 5.0, 0.0])
         assert call(services, "simulation", "set_object_position", "dog", [0, 0, 0]).startswith(
@@ -62,10 +62,10 @@ def test_the_simulator_is_supervised_and_a_killed_gateway_comes_back(house: Hous
         )
         assert call(services, "simulation", "reset_objects") == "Objects restored to initial position"
         wait_for("the mouse", lambda: call(services, "simulation", "get_scene_objects")["mouse"][1] == [1.0, 0.0, 0.0])
-        assert call(services, "simulation", "deactivate", "Cat.001.Pose") is None
+        assert call(services, "simulation", "deactivate", "Cat_001.Pose") is None
         last = wait_for("no reading", lambda: stood(services))
-        assert call(services, "simulation", "activate", "Cat.001.Pose") is None
-        wait_for("a reading", lambda: call(services, "Cat.001.Pose", "get_local_data") != last)
+        assert call(services, "simulation", "activate", "Cat_001.Pose") is None
+        wait_for("a reading", lambda: call(services, "Cat_001.Pose", "get_local_data") != last)
         assert call(services, "time", "set_time_scale", 2.0) is True
         assert call(services, "simulation", "suspend_dynamics") == "Physics is suspended"
         with control.connect() as run:
@@ -87,6 +87,6 @@ def test_the_simulator_is_supervised_and_a_killed_gateway_comes_back(house: Hous
 
 def stood(services: IO[str]) -> Any:
     """Return the newest reading if it is the newest twice in a tenth of a second; None otherwise."""
-    first = call(services, "Cat.001.Pose", "get_local_data")
+    first = call(services, "Cat_001.Pose", "get_local_data")
     call(services, "time", "sleep", 0.1)
-    return first if call(services, "Cat.001.Pose", "get_local_data") == first else None
+    return first if call(services, "Cat_001.Pose", "get_local_data") == first else None
