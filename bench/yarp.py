@@ -24,6 +24,7 @@ import numpy as np
 from bench.machine import free_ports
 from bench.runs import ROOT, BenchError, watch
 from foosim.capture.reader import open_capture
+from foosim.common.errors import Failed
 from foosim.gateways.yarp.name_server import name_server
 from foosim.gateways.yarp.ports import NameClient, Port
 from foosim.gateways.yarp.wire import message
@@ -159,7 +160,7 @@ async def _registered(names: NameClient, name: str) -> None:
 async def _answer(names: NameClient, line: str) -> list[str]:
     try:
         return await names.request(line)
-    except Exception:  # noqa: BLE001  # the gateway starts the name server with its run
+    except Failed:  # the gateway starts the name server with its run
         return []
 
 

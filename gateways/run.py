@@ -7,7 +7,7 @@ drive it with the packets of a simulation in their own process.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -235,6 +235,18 @@ class Run:
         self._called.append(called)
         self._look_at_jobs()
         return called
+
+    @property
+    def has_jobs(self) -> bool:
+        """Whether a service takes time."""
+        return bool(self._called)
+
+    def fail(self, absent: Collection[str]) -> None:
+        """End the services of robots that are absent."""
+        for called in self._called:
+            if called.component.robot in absent:
+                called.job.state, called.job.why = JobState.FAILED, "its robot is absent"
+        self._look_at_jobs()
 
     def cancel(self, called: Called) -> None:
         """Call a service off that takes time."""

@@ -29,7 +29,6 @@ from foosim.world.component_types.settings import GatewaySettings
 
 SERVICE_PORTS: Final = 10
 """Ports for services that are tried in turn."""
-DATASTREAM: Final = "morse.middleware.socket_datastream.SocketDatastreamManager"
 Port = Annotated[int, Field(ge=0, le=65_535)]
 
 

@@ -10,6 +10,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from math import sqrt
 from typing import Any, Final, TypeVar
@@ -98,6 +99,7 @@ class Supervision(Listener):
         """The newest one that was shown."""
         self._threads = ThreadPoolExecutor(1, "operator")
         self._control: Control | None = None
+        self._looking: asyncio.Future[None] | None = None
         self._quitting: asyncio.Future[str] | None = None
         self._sleeps: list[tuple[float, asyncio.Future[None]]] = []
         self.services: Final[Mapping[str, Mapping[str, Callable[..., Any]]]] = {
@@ -174,6 +176,14 @@ class Supervision(Listener):
         """Take a frame that is shown."""
         self._commit = decode(Commit, payload, channels.VIEW.bytes_max)
         self._run.arrived("", (), self._commit.tick)
+        if self._run.has_jobs and (self._looking is None or self._looking.done()):
+            self._looking = asyncio.ensure_future(self._fail_absent())
+
+    async def _fail_absent(self) -> None:
+        """End the jobs of robots that are absent, which report nothing."""
+        with suppress(Refused):
+            _, frame = await self._looked()
+            self._run.fail([one.name for one in frame.layout.robots if one.is_absent(frame.numbers)])
 
     async def _looked(self) -> tuple[World, Frame]:
         """Return the world, made at the first look, and its newest frame."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @contextmanager
 def connected(folder: RunFolder, start: int = 1) -> Iterator[IO[str]]:
     """Connect to the services of the gateway that was started for the first time, or again."""
-    log = folder.logs / "morse.log"
+    log = folder.logs / "socket.log"
 
     def stream() -> tuple[socket.socket, IO[str]] | None:
         found = re.findall(r"services at tcp/127\.0\.0\.1:(\d+)", log.read_text()) if log.exists() else []
@@ -50,8 +50,12 @@ def call(services: IO[str], component: str, service: str, *parameters: Any) -> A
 
 def test_the_simulator_is_supervised_and_a_killed_gateway_comes_back(house: House) -> None:
     path = house.folder / "field.yaml"
-    path.write_text(TEXT.replace("pace: fast", "pace: realtime"))
-    house.start("foosim", "up", path, *ONE, "--no-capture")
+    text = TEXT.replace("pace: fast", "pace: realtime").replace("morse-", "socket-")
+    path.write_text(
+        "".join(line for line in text.splitlines(keepends=True) if "morse" not in line and "gateways" not in line)
+    )
+    own = "--set", "gateways.socket.listen='127.0.0.1:0'", "--set", "gateways.socket.streams=0"
+    house.start("foosim", "gateway", "socket", path, *ONE, "--no-capture", *own)
     folder = house.live()
     with connected(folder) as services:
         assert call(services, "communication", "distance_and_view", "Cat_001", "mouse") == [pytest.approx(4.0), True]
@@ -74,9 +78,12 @@ def test_the_simulator_is_supervised_and_a_killed_gateway_comes_back(house: Hous
         assert call(services, "simulation", "restore_dynamics") == "Physics is resumed"
         assert call(services, "time", "sleep", 0.2) is None
         assert call(services, "time", "statistics")["mean_time"] > 0.0
-        at_gateway = wait_for("the report", lambda: folder.gateways().get("morse", {}).get("programs"))
+        with control.connect() as run:
+            run.request("remove", name="mouse")
+        assert call(services, "mouse.go", "goto", 9.0, 9.0, 0.0) == "FAILED: mouse.go has failed: its robot is absent"
+        at_gateway = wait_for("the report", lambda: folder.gateways().get("socket", {}).get("programs"))
         assert at_gateway[0]["what"] == "services"
-        (pid,) = processes_with(f"role gateway --name morse --connect run:{folder.name}")
+        (pid,) = processes_with(f"role gateway --name socket --connect run:{folder.name}")
         os.kill(pid, signal.SIGKILL)
         assert services.readline() == ""
     with connected(folder, 2) as again:
