@@ -113,9 +113,9 @@ def test_each_match_has_a_value_of_its_own() -> None:
 
 def test_a_key_with_an_asterisk_is_itself() -> None:
     text = (DEPLOY / "warehouse.yaml").read_text()
-    sets = ["templates.pilot.hears.pilot09=[beacon]", "templates.pilot.hears.pilot*=[fleet]"]
-    deployment = load_deployment(apply_sets(text, "w", sets), "w")
-    assert deployment.players["pilot01"].hears == {"pilot*": ["fleet"], "dispatch": ["fleet"], "pilot09": ["beacon"]}
+    usual = "templates.pilot.hears={pilot*: [beacon], pilot0*: [beacon]}"
+    deployment = load_deployment(apply_sets(text, "w", [usual, "templates.pilot.hears.pilot*=[fleet]"]), "w")
+    assert deployment.players["pilot01"].hears == {"pilot*": ["fleet"], "pilot0*": ["beacon"]}
 
 
 @pytest.mark.parametrize(
