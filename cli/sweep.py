@@ -78,21 +78,21 @@ def sweep_command(options: SweepOptions) -> None:
     limit_s = read_at("--limit", parse_ns, options.limit) / 1e9
     if options.dask is not None and options.jobs is not None:
         raise BadValue("--jobs: the workers of --dask are those of its cluster", options.jobs)
-    told = _Told()
+    so_far = _Progress()
     with executor_here(options.jobs or os.cpu_count() or 1) if options.dask is None else _cluster(options.dask) as its:
         try:
-            sweep(study, its, out, limit_s, told.take)
+            sweep(study, its, out, limit_s, so_far.take)
         except BrokenExecutor as error:
             raise Failed(f"the workers have ended, the same command continues the sweep: {error}") from None
         except KeyboardInterrupt:
-            typer.echo(f"interrupted, the same command continues the sweep: {told.last.text}", err=True)
+            typer.echo(f"interrupted, the same command continues the sweep: {so_far.last.text}", err=True)
             raise typer.Exit(INTERRUPTED) from None
-    last = told.last
+    last = so_far.last
     typer.echo(f"{last.text}, in {out}: {last.ended} in {last.elapsed_s:.1f} s, {last.wall_s:.1f} s of work")
     raise typer.Exit(FAILED if last.failed else DONE)
 
 
-class _Told:
+class _Progress:
     """Writes a line of progress a second."""
 
     def __init__(self) -> None:

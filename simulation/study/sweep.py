@@ -115,8 +115,8 @@ def sweep(
     and after Ctrl-C.
     """
     results = Results(study, out)
-    told = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic())
-    progress(told)
+    so_far = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic())
+    progress(so_far)
     keys: dict[Future[Ran], tuple[Any, ...]] = {}
     try:
         for key, run in results.missing.items():
@@ -124,9 +124,9 @@ def sweep(
         for done in as_completed(keys):
             outcome = _outcome(done)
             results.add(keys[done], outcome)
-            told.ended, told.failed = told.ended + 1, told.failed + bool(outcome.message)
-            told.wall_s += outcome.wall_s
-            progress(told)
+            so_far.ended, so_far.failed = so_far.ended + 1, so_far.failed + bool(outcome.message)
+            so_far.wall_s += outcome.wall_s
+            progress(so_far)
     finally:
         for future in keys:
             future.cancel()

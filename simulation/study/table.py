@@ -47,12 +47,12 @@ class Table:
         return (*self.parameters, SEED, *self.metrics, *LAST)
 
     def key(self, row: Mapping[str, Any]) -> tuple[Any, ...]:
-        """Return what tells a row's run from the others: its values and its seed."""
+        """Return the values and the seed of a row's run."""
         return (*(row[name] for name in self.parameters), row[SEED])
 
 
 def check_results(path: Path) -> None:
-    """Refuse a file that is none of results by its name. Raises BadValue, and Failed where pyarrow is absent."""
+    """Refuse a file that cannot be one of results by its name. Raises BadValue, and Failed where pyarrow is absent."""
     if path.suffix not in ENDINGS:
         raise BadValue(f"the name of a results file ends with {', '.join(ENDINGS)}", str(path))
     if path.suffix == ".parquet" and find_spec("pyarrow") is None:
