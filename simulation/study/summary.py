@@ -25,7 +25,7 @@ SPREAD: Final = 0.01
 
 @dataclass(slots=True)
 class Group:
-    """The runs with these texts of parameters, those that failed, and the values by metric of the others.
+    """The runs with these texts of parameters, the failed ones among them, and the values by metric of the others.
 
     A run without a value of a metric adds none.
     """

@@ -15,8 +15,8 @@ DELAY, TEAM = "network.links.0.delay", "players.red.class"
 COUNTS = {f"packets.{name}": 7 for name in ("offered", "delivered", "dropped", "in_flight", "refused")}
 
 
-def row(delay: str, team: str, seed: int, score: float | None, message: str = "", **more: float) -> dict[str, Any]:
-    figures = {} if message else {"players.red.saves": 2.0, **more, "ticks": 500, **COUNTS, "digest": "ab"}
+def row(delay: str, team: str, seed: int, score: float | None, message: str = "") -> dict[str, Any]:
+    figures = {} if message else {"players.red.saves": 2.0, "ticks": 500, **COUNTS, "digest": "ab"}
     figures |= {} if score is None else {"score.red": score}
     ends = {"message": message, "study": "s", "foosim": "0.2.0"}
     return {DELAY: delay, TEAM: team, "seed": seed, **figures, **ends}
@@ -69,7 +69,7 @@ def test_json_has_what_the_table_has(typed: Typed, results: Path) -> None:
 
 def test_more_metrics_than_a_line_holds_have_further_tables(typed: Typed, tmp_path: Path) -> None:
     names = [f"players.the-player-{number}.distance" for number in range(9)]
-    rows = [row("0ms", "a:B", seed, 1.0, **dict.fromkeys(names, float(seed))) for seed in (1, 2)]
+    rows = [row("0ms", "a:B", seed, 1.0) | dict.fromkeys(names, float(seed)) for seed in (1, 2)]
     write_table(tmp_path / "wide.csv", Table((DELAY, TEAM), rows))
     lines = typed("sweep", "table")(tmp_path / "wide.csv").out.splitlines()
     heads = [line.split() for line in lines if line.startswith(DELAY)]

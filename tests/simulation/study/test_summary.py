@@ -82,7 +82,9 @@ def test_a_picture_has_a_panel_for_each_metric_and_a_curve_for_each_combination(
     second = slow_bars.get_segments()[1]
     mean = groups(TABLE, [DELAY, RATE], ["score"])[0].mean("score")
     assert mean is not None and second[:, 1].tolist() == pytest.approx([mean.low, mean.high])
-    assert [text.get_text() for text in score.get_legend().get_texts()] == [f"{RATE}=10Hz", f"{RATE}=50Hz"]
+    legend = score.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == [f"{RATE}=10Hz", f"{RATE}=50Hz"]
 
 
 def test_values_that_are_no_quantities_stand_in_their_first_order() -> None:
