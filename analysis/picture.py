@@ -20,15 +20,15 @@ DATES: Final = {".svg": "Date", ".pdf": "CreationDate"}
 """The metadata that would have the time of the drawing."""
 
 
-def check_picture(out: Path) -> None:
+def check_picture(out: Path, option: str = "--picture") -> None:
     """Refuse what cannot be drawn before anything is computed for it.
 
     Raises BadValue for another ending, Existing for a file that exists, Failed for one that cannot be made, and where
     matplotlib is not installed.
     """
-    check_name("--picture", out, "the picture", ENDINGS)
+    check_name(option, out, "the picture", ENDINGS)
     if find_spec("matplotlib") is None:
-        raise Failed("--picture needs matplotlib: pip install 'foosim[plot]'")
+        raise Failed(f"{option} needs matplotlib: pip install 'foosim[plot]'")
 
 
 @contextmanager

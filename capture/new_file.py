@@ -23,6 +23,11 @@ def check_name(option: str, out: Path, what: str, endings: tuple[str, ...]) -> N
     if out.suffix.lower() not in endings:
         raise BadValue(f"{option}: the name of {what} ends with {' or '.join(endings)}", str(out))
     check_absent(out)
+    check_writable(out)
+
+
+def check_writable(out: Path) -> None:
+    """Raise Failed where no file can be made, or replaced."""
     part = _part(out)
     try:
         part.touch()

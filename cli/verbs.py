@@ -101,7 +101,7 @@ class Foosim(Verbs):
             **dict.fromkeys(("stop", "start", "balance"), "cli.control"),
         },
         "Before a run": dict.fromkeys(("check", "components", "components check", "urdf", "schema"), "cli.check"),
-        "In one process": {"rehearse": "cli.rehearse", "match": "cli.match.command"},
+        "In one process": {"rehearse": "cli.rehearse", "match": "cli.match.command", "sweep": "cli.sweep"},
         "Captures and networks": {"capture": "cli.capture.command", "net": "cli.net"},
         "Other simulators": {"morse": "cli.morse"},
         "Machines and measurements": {"pki": "cli.pki", "doctor": "cli.doctor", "fit": "fitting.main"},

@@ -9,7 +9,7 @@ Numbers are read as exact fractions and rounded once, so `84 mm` is the float ne
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -110,6 +110,8 @@ BITRATE: Final = Dimension(
 POWER_LEVEL: Final = Dimension("power level", _sizes(dBm="1"))
 GAIN: Final = Dimension("antenna gain", _sizes(dBi="1"))
 
+_DIMENSIONS: Final = [one for one in globals().values() if isinstance(one, Dimension)]
+
 
 def parse(text: object, dimension: Dimension) -> Fraction:
     """The quantity in the dimension's base unit, exact; raises BadValue."""
@@ -121,13 +123,29 @@ def parse(text: object, dimension: Dimension) -> Fraction:
     number, unit = match[1], match[2]
     if unit not in dimension.units:
         # Dimensions are equal by their base unit, so MHz is one of a rate, too.
-        for other in [one for one in globals().values() if isinstance(one, Dimension) and unit in one.units]:
-            if other.base not in dimension.units:
+        for other in _DIMENSIONS:
+            if unit in other.units and other.base not in dimension.units:
                 raise BadValue(f"{dimension.refusal}; {unit} measures {other.one}", text)
         close = (dimension.usual or dimension.base) if unit is None else _nearest_unit(unit, dimension)
         nearest = None if close is None else repr(f"{number} {close}")
         raise BadValue(dimension.refusal, text, nearest)
     return Fraction(number) * dimension.units[unit]
+
+
+def in_one_unit(texts: Sequence[str]) -> tuple[list[float], str] | None:
+    """Quantities of one dimension as numbers of the first one's unit, with it; None for other texts.
+
+    Plain numbers are quantities of the unit ''.
+    """
+    matches = [_QUANTITY.fullmatch(text.strip(" ")) for text in texts]
+    found = [(Fraction(match[1]), match[2] or "") for match in matches if match is not None]
+    if len(found) < len(texts) or not found:
+        return None
+    unit = found[0][1]
+    for units in ({"": Fraction(1)}, *(one.units for one in _DIMENSIONS)):
+        if all(own in units for _, own in found):
+            return [float(number * units[own] / units[unit]) for number, own in found], unit
+    return None
 
 
 def _nearest_unit(unit: str, dimension: Dimension) -> str | None:

@@ -5,6 +5,12 @@ longest key that fits is meant; a new one is written in double quotes. An entry 
 or `.0`, or by its `id`. The value is YAML. Settings apply in order; their places are `--set:N:COLUMN`, N counting
 settings from 1.
 
+A step with `*` or `?` is a pattern of whole keys (fnmatch, case-sensitive), of numbers and ids in a list, unless a key
+is exactly that. The value is set wherever all of the path but its last key is there: `robots.*.sensors.pose.rate` in
+the robots that have a sensor `pose`, whether or not its rate is written. A last step that is a pattern matches keys
+that are there. A `*` matches dots as well, and neighbouring steps may be one key with dots, so that `robots.red.*` and
+`robots."red.*"` are the robots whose names begin with `red.`. A path without a match is an error.
+
 They apply to the file as it is written. A path may lead through what an entry has by a template or a count: then the
 entry gets keys of its own, as if they were written in the file.
 """
@@ -13,9 +19,10 @@ import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from typing import Any, Final
 
-from foosim.common.errors import DeploymentError, describe, show
+from foosim.common.errors import DeploymentError, UnknownName, describe, show
 from foosim.common.names import nearest_name
 from foosim.deployment.components import SECTIONS
 from foosim.deployment.schema import Deployment
@@ -65,7 +72,9 @@ def place_sets(tree: Tree, sets: Sequence[str]) -> tuple[Tree, list[Problem]]:
             value, value_problems = _read_value(text, start, number)
             problems += value_problems
             if value is not None:
-                _put(tree, steps, value, number)
+                sections: dict[str, Tree | None] = {}
+                for path in _paths(_Taken(tree, sections), steps):
+                    _put(_Taken(tree, sections), path, copied(value), number)
         except _Misplaced as misplaced:
             problems.append(Problem(_place(number, misplaced.column), misplaced.text))
     return tree, problems
@@ -136,9 +145,54 @@ def _read_value(text: str, start: int, number: int) -> tuple[Tree | None, list[P
     return read_tree(value, locate)
 
 
-def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int) -> None:
-    """Replace or add the value at the path."""
-    node, taken = tree, _Taken(tree)
+def _paths(taken: "_Taken", steps: Sequence[tuple[str, int]]) -> list[list[tuple[str, int]]]:
+    """The paths that the steps stand for: themselves where none of them is a pattern."""
+    if not any(_is_pattern(step) for step, _ in steps):
+        return [[*steps]]
+    missed: dict[int, set[str]] = {}
+    if not (paths := _matching(taken, steps, 0, missed)) and None not in taken.sections.values():
+        last = max(missed)
+        path = ".".join(step for step, _ in steps[:last])
+        text = str(UnknownName("nothing matches", steps[last][0], missed[last]))
+        raise _Misplaced(steps[last][1], f"{path}: {text}" if path else text)
+    return paths
+
+
+def _is_pattern(step: str) -> bool:
+    return "*" in step or "?" in step
+
+
+def _matching(
+    taken: "_Taken", steps: Sequence[tuple[str, int]], index: int, missed: dict[int, set[str]]
+) -> list[list[tuple[str, int]]]:
+    """The ends of paths that the steps from `index` stand for; `missed` gets the names that are there, by index."""
+    there = taken.at()
+    keys = {name: name for name in taken.names()}
+    if isinstance(there, Items):
+        numbers = [str(number) for number in range(len(there.items))]
+        keys = {name: str(number) for name, number in _ids(there).items()} | dict(zip(numbers, numbers, strict=True))
+    missed.setdefault(index, set()).update(keys)
+    dots = max((name.count(".") for name in keys), default=0)
+    paths = []
+    for stop in range(index + 1, min(index + 1 + dots, len(steps)) + 1):
+        text = ".".join(step for step, _ in steps[index:stop])
+        if text in keys:
+            matches = [keys[text]]
+        elif _is_pattern(text):
+            matches = list(dict.fromkeys(key for name, key in keys.items() if fnmatchcase(name, text)))
+        else:
+            is_new = isinstance(there, Fields) and index + 1 == stop == len(steps)
+            matches = [text] if is_new else []
+        for key in matches:
+            further = _Taken(taken.tree, taken.sections, [*taken.steps, int(key) if isinstance(there, Items) else key])
+            ends = [[]] if stop == len(steps) else _matching(further, steps, stop, missed)
+            paths += [[(key, steps[index][1]), *end] for end in ends]
+    return paths
+
+
+def _put(taken: "_Taken", steps: Sequence[tuple[str, int]], value: Tree, number: int) -> None:
+    """Replace or add the value at the path, whose start is `taken`."""
+    node = tree = taken.tree
     index = 0
     while True:
         if isinstance(node, Items):
@@ -156,7 +210,7 @@ def _put(tree: Tree, steps: Sequence[tuple[str, int]], value: Tree, number: int)
         if index + used == len(steps):
             if taken.steps[:1] == [TEMPLATES] and plain(value) is None and key in node.values:
                 del node.keys[key], node.values[key]  # a null of a template with nothing below it would stay
-                if key not in taken.names():
+                if key not in _Taken(tree, {}, taken.steps).names():
                     return
             node.keys[key] = _place(number, steps[index][1])
             node.values[key] = value
@@ -173,6 +227,8 @@ class _Taken:
     """The path through a tree so far, in the tree with expanded templates and counts."""
 
     tree: Tree
+    sections: dict[str, Tree | None]
+    """Of the expanded tree, from their first use on; None for an invalid one. All paths of a setting share them."""
     steps: list[str | int] = field(default_factory=list)
 
     def names(self) -> Collection[str]:
@@ -182,11 +238,14 @@ class _Taken:
 
     def at(self, *more: str) -> Tree | None:
         """The node at its end, or some steps further."""
-        node: Tree | None = None
         way = [*self.steps, *more]
-        if way and isinstance(self.tree, Fields):
+        if not way or not isinstance(self.tree, Fields):
+            return self.tree if not way else None
+        if (name := str(way[0])) not in self.sections:
+            self.sections[name] = None
             with suppress(Stopped):
-                node = Expansion(self.tree, Report()).section(str(way[0]))
+                self.sections[name] = Expansion(self.tree, Report()).section(name)
+        node = self.sections[name]
         for step in way[1:]:
             if isinstance(node, Fields) and isinstance(step, str):
                 node = node.values.get(step)
@@ -233,11 +292,7 @@ def _entry(node: Items, step: str, column: int) -> int:
     """The index of a list's entry, from its number or its id."""
     if step.isascii() and step.isdigit() and len(step) < 6 and int(step) < len(node.items):
         return int(step)
-    ids: dict[str, int] = {}
-    for index, item in enumerate(node.items):
-        name = item.values.get("id") if isinstance(item, Fields) else None
-        if isinstance(name, Leaf) and isinstance(name.value, str):
-            ids.setdefault(name.value, index)
+    ids = _ids(node)
     if step in ids:
         return ids[step]
     named = {index: name for name, index in ids.items()}
@@ -245,3 +300,13 @@ def _entry(node: Items, step: str, column: int) -> int:
     more = ", ..." if len(entries) > ENTRIES_SHOWN_MAX else ""
     choices = f"the list has {', '.join(entries[:ENTRIES_SHOWN_MAX])}{more}" if entries else "the list is empty"
     raise _Misplaced(column, f"no such entry, {show(step)}: {choices}")
+
+
+def _ids(node: Items) -> dict[str, int]:
+    """The indices of a list's entries by their ids."""
+    ids: dict[str, int] = {}
+    for index, item in enumerate(node.items):
+        name = item.values.get("id") if isinstance(item, Fields) else None
+        if isinstance(name, Leaf) and isinstance(name.value, str):
+            ids.setdefault(name.value, index)
+    return ids

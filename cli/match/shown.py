@@ -10,7 +10,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from foosim.simulation.match.figures import Figures, Interval
+from foosim.analysis.intervals import Interval
+from foosim.simulation.match.figures import Figures
 from foosim.simulation.match.game import Entrant, Fixture, Game, Link, Played
 
 

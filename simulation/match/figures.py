@@ -1,34 +1,17 @@
-"""Figures of a match: wins, points and what went away, each with its interval of 95 %, and their picture.
-
-Sources: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) for shares; Student's t for means, its distribution by the finite
-series of Abramowitz and Stegun 26.7.3 and 26.7.4; for counts in a time the score interval of a Poisson rate.
-"""
+"""Figures of a match: wins, points and what went away, each with its interval of 95 %, and their picture."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import atan, comb, cos, pi, sin, sqrt
+from math import comb
 from typing import TYPE_CHECKING, Final
 
+from foosim.analysis.intervals import Interval, bars_of, mean, rate, share
 from foosim.simulation.match.game import Link, Played
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Z: Final = 1.959963984540054
-"""The normal distribution's quantile of 97.5 %."""
-LEVEL: Final = 0.975
-BISECTIONS: Final = 80
-
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """An estimate with its 95 % interval, whose bounds are None for too few games."""
-
-    value: float
-    low: float | None
-    high: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,60 +61,10 @@ def figures(played: Sequence[Played], tick_ns: int) -> Figures:
     )
 
 
-def share(count: int, of: int) -> Interval:
-    """Return a share and its Wilson interval."""
-    p, square = count / of, Z * Z
-    centre = (p + square / (2 * of)) / (1 + square / of)
-    half = Z * sqrt(p * (1 - p) / of + square / (4 * of * of)) / (1 + square / of)
-    return Interval(p, max(centre - half, 0.0), min(centre + half, 1.0))
-
-
 def chance(count: int, of: int) -> float:
     """Return the two-sided probability of a count so far from the half of `of` fair throws, or farther."""
     least = min(count, of - count)
     return min(1.0, 2 * sum(comb(of, number) for number in range(least + 1)) / (1 << of))
-
-
-def mean(values: Sequence[float]) -> Interval:
-    """Return a mean and its interval by Student's t."""
-    count = len(values)
-    found = sum(values) / count
-    if count < 2:
-        return Interval(found, None, None)
-    deviation = sqrt(sum((value - found) ** 2 for value in values) / (count - 1))
-    half = t_quantile(count - 1) * deviation / sqrt(count)
-    return Interval(found, found - half, found + half)
-
-
-def rate(count: int, time: float) -> Interval:
-    """Return a count per unit of time and its score interval."""
-    if time <= 0.0:
-        return Interval(0.0, None, None)
-    centre, half = count + Z * Z / 2, Z * sqrt(count + Z * Z / 4)
-    return Interval(count / time, max(centre - half, 0.0) / time, (centre + half) / time)
-
-
-def t_quantile(freedom: int) -> float:
-    """Return Student's t of 97.5 % for a number of degrees of freedom."""
-    low, high = 0.0, 20.0
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _t_within(middle, freedom) < 2 * LEVEL - 1 else (low, middle)
-    return high
-
-
-def _t_within(t: float, freedom: int) -> float:
-    """Return the probability that |Student's t| is at most `t`."""
-    angle = atan(t / sqrt(freedom))
-    square = cos(angle) ** 2
-    odd = freedom % 2
-    term = total = cos(angle) if odd else 1.0
-    for number in range(3 if odd else 2, freedom - 1, 2):
-        term *= square * (number - 1) / number
-        total += term
-    if not odd:
-        return sin(angle) * total
-    return 2 / pi * (angle + (sin(angle) * total if freedom > 1 else 0.0))
 
 
 # --- drawn -----------------------------------------------------------------------------------------------------------
@@ -162,12 +95,10 @@ def draw(figure: Figure, cells: Cells, labels: tuple[str, str], title: str) -> N
         places = [delay_ms + SPREAD * longest_ms * number for delay_ms in delays]
         for panel, look, figure_of in curves:
             found = [figure_of(rows[delay_ms]) for delay_ms in delays]
-            below = [0.0 if one.low is None else one.value - one.low for one in found]
-            above = [0.0 if one.high is None else one.high - one.value for one in found]
-            values = [one.value for one in found]
+            values, bars = bars_of(found)
             name = f"loss {100 * loss:g} %" if look == "o-" else None
             (left, right)[panel].errorbar(
-                places, values, (below, above), fmt=look, color=f"C{number}", markersize=4, elinewidth=1, label=name
+                places, values, bars, fmt=look, color=f"C{number}", markersize=4, elinewidth=1, label=name
             )
     for axes in (left, right):
         axes.set_xlabel("delay each way, ms")

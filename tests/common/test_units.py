@@ -42,6 +42,26 @@ def test_a_quantity_is_the_nearest_float_in_si_units(text: str, dimension: Dimen
 
 
 @pytest.mark.parametrize(
+    ("texts", "numbers"),
+    [
+        (["10ms", "0 s", "1.5s", "1 min"], ([10.0, 0.0, 1500.0, 60_000.0], "ms")),
+        (["1", "-2.5e-1", "0"], ([1.0, -0.25, 0.0], "")),
+        (["5 %", "0.1 p"], ([5.0, 10.0], "%")),
+        (["1 GHz", "100 MHz"], ([1.0, 0.1], "GHz")),
+        (["10ms", "10mm"], None),
+        (["10ms", "10"], None),
+        (["10ms", "slow"], None),
+        (["1 parsec"], None),
+        ([], None),
+    ],
+)
+def test_quantities_of_one_dimension_are_numbers_of_the_first_unit(
+    texts: list[str], numbers: tuple[list[float], str] | None
+) -> None:
+    assert units.in_one_unit(texts) == numbers
+
+
+@pytest.mark.parametrize(
     ("text", "time_ns"),
     [
         ("2 ms", 2_000_000),

@@ -14,7 +14,11 @@ from foosim.deployment.schema import Deployment
 from foosim.library.table.rod import RodRobot
 from foosim.world.component_types.settings import RobotSettings
 
-TABLE_TEXT = (Path(__file__).parents[2] / "deploy" / "table.yaml").read_text()
+DEPLOY = Path(__file__).parents[2] / "deploy"
+TABLE_TEXT = (DEPLOY / "table.yaml").read_text()
+SIDES = ("red", "blue")
+ROVERS = [f"rover{number:02}" for number in range(1, 22)]
+RED = ("goal", "defence", "midfield", "attack")
 
 
 def changed(*sets: str) -> Deployment:
@@ -74,6 +78,61 @@ def test_a_new_name_with_dots_stands_in_quotes() -> None:
         "nodes.blue.robots=[blue.goal, blue.defence, blue.midfield, blue.attack, spare.eye]",
     )
     assert deployment.owners()["spare.eye"] == "blue"
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern", "paths"),
+    [
+        ("table", "robots.red.*.sensors.encoder.rate=50 Hz", [f"robots.red.{rod}.sensors.encoder.rate" for rod in RED]),
+        ("table", 'robots."red.*".actuators={}', [f"robots.red.{rod}.actuators" for rod in RED]),
+        ("table", "robots.*.goal.sensors.enc?der.rate=50 Hz", [f"robots.{s}.goal.sensors.encoder.rate" for s in SIDES]),
+        ("table", "robots.red.goal.*.*.rate=50 Hz", ["robots.red.goal.sensors.encoder.rate"]),
+        ("table", "network.links.e*.delay=3 ms", ["network.links[0].delay"]),
+        ("table", "robots.red.goal.sensors.*={kind: encoder, rate: 5 Hz}", ["robots.red.goal.sensors.encoder"]),
+        ("warehouse", "scenery.*-4.radius=300 mm", ["scenery.pillar-4.radius"]),
+        ("warehouse", "robots.*.sensors.pose.rate=10Hz", [f"robots.{name}.sensors.pose.rate" for name in ROVERS]),
+        ("warehouse", "robots.rover0?.sensors.pose.modifiers.*.std.heading=0 deg",
+         [f"robots.{name}.sensors.pose.modifiers[0].std.heading" for name in ROVERS[:9]]),
+        ("warehouse", "network.links.*.delay=3 ms", ["network.links.0.delay", "network.links.1.delay"]),
+    ],
+)  # fmt: skip
+def test_a_pattern_is_a_setting_for_each_path_that_is_there(file: str, pattern: str, paths: list[str]) -> None:
+    """Also by a template or a count; `base` and `porter` of the warehouse have no pose."""
+    text = (DEPLOY / f"{file}.yaml").read_text()
+    value = pattern.partition("=")[2]
+    canonical = apply_sets(text, file, [pattern])
+    assert canonical == apply_sets(text, file, [f"{path}={value}" for path in paths]) != apply_sets(text, file, [])
+
+
+def test_each_match_has_a_value_of_its_own() -> None:
+    deployment = changed(
+        "robots.red.*.sensors.encoder={kind: encoder, rate: 50 Hz}", "robots.red.goal.sensors.encoder.rate=5 Hz"
+    )
+    assert [deployment.robots[f"red.{rod}"].sensors["encoder"].rate_hz for rod in RED] == [5, 50, 50, 50]
+
+
+def test_a_key_with_an_asterisk_is_itself() -> None:
+    text = (DEPLOY / "warehouse.yaml").read_text()
+    usual = "templates.pilot.hears={pilot*: [beacon], pilot0*: [beacon]}"
+    deployment = load_deployment(apply_sets(text, "w", [usual, "templates.pilot.hears.pilot*=[fleet]"]), "w")
+    assert deployment.players["pilot01"].hears == {"pilot*": ["fleet"], "pilot0*": ["beacon"]}
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("robots.rd.*.model=rod", "--set:1:8: robots: nothing matches (there are: blue.attack, "),
+        ("robots.red.*.sensors.encodr.rate=1 Hz", "--set:1:22: robots.red.*.sensors: nothing matches "
+         "(there are: encoder), 'encodr', nearest is 'encoder'"),
+        ("robot.*.model=rod", "--set:1:1: nothing matches (there are: capture, "),
+        ("network.links.x*.delay=0 ms", "--set:1:15: network.links: nothing matches (there are: 0, everything), 'x*'"),
+        ("table.lines.GOAL*=1", "--set:1:13: table.lines: nothing matches "
+         "(there are: attack, defence, goal, midfield), 'GOAL*', nearest is 'goal'"),
+        ("tick.*=1", "--set:1:6: tick: nothing matches (there are: none), '*'"),
+    ],
+)  # fmt: skip
+def test_a_pattern_without_a_match_is_refused_with_the_names_that_are_there(text: str, problem: str) -> None:
+    assert refused(text)[0].startswith(problem)
 
 
 @pytest.mark.parametrize(

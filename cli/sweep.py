@@ -1,0 +1,139 @@
+"""The command `foosim sweep`: runs over combinations of parameters and seeds, in several processes or on a cluster."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from foosim.cli.run_command import with_options
+from foosim.common.errors import BadValue, Failed, read_at
+from foosim.common.units import parse_ns
+from foosim.runtime.command import DONE, FAILED, INTERRUPTED, new_app
+from foosim.simulation.attendant import LINE_S
+from foosim.simulation.study.study import Study, read_study, seeds_of, study_of, values_of
+from foosim.simulation.study.sweep import LIMIT_S, Progress, sweep
+from foosim.simulation.workers import executor_here
+
+CONNECT: Final = "10s"
+
+app = new_app()
+
+
+@dataclass(frozen=True, slots=True)
+class SweepOptions:
+    """The settings of a sweep; each field is an argument or option of the command."""
+
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A deployment file, or a study file.")]
+    vary: Annotated[
+        tuple[str, ...],
+        typer.Option(
+            "--vary", metavar="PATH=VALUES", help="A parameter as of --set, and its values: 0ms,10ms or 1..5."
+        ),
+    ] = ()
+    seeds: Annotated[str | None, typer.Option("--seeds", help="Seeds of each combination: 1..20 or 1,2,5.")] = None
+    duration: Annotated[str | None, typer.Option("--for", help="Simulated time of each run, e.g. 60s.")] = None
+    sets: Annotated[
+        tuple[str, ...], typer.Option("--set", help="Change the deployment of all runs; may be repeated.")
+    ] = ()
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Results, .csv, .jsonl or .parquet; by default NAME-sweep.csv.")
+    ] = None
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", help="Number of processes; by default that of the processors.", min=1)
+    ] = None
+    dask: Annotated[
+        str | None, typer.Option("--dask", metavar="ADDRESS", help="Use the workers of this Dask scheduler.")
+    ] = None
+    limit: Annotated[str, typer.Option("--limit", metavar="TIME", help="Wall time that a run may take.")] = (
+        f"{LIMIT_S:g}s"
+    )
+
+
+@app.command()
+@with_options()
+def sweep_command(options: SweepOptions) -> None:
+    """Run a deployment for each combination of values and each seed, and write a table with a row for each run.
+
+    Each run is a rehearsal. Its row has the values of its parameters, its seed, its metrics, packets and digest, and a
+    message where it failed. A row that exists is not run again: the same command continues a sweep that was
+    interrupted, one with more values or seeds extends it. Results of another study or version of foosim are refused.
+
+    A run whose process is killed, or that takes longer than --limit, costs its row. With --dask the workers of a
+    cluster do the runs (pip install 'foosim[dask]'); the deployment's folder has the same path there.
+    `foosim sweep table` and `foosim sweep plot` show the results.
+
+    Exit codes: 0 done, 1 a run has failed, 2 bad input, 3 results of another study, 130 Ctrl-C.
+    """
+    study = _study(options)
+    out = options.out or Path(f"{options.file.stem}-sweep.csv")
+    limit_s = read_at("--limit", parse_ns, options.limit) / 1e9
+    if options.dask is not None and options.jobs is not None:
+        raise BadValue("--jobs: the workers of --dask are those of its cluster", options.jobs)
+    so_far = _Progress()
+    with executor_here(options.jobs or os.cpu_count() or 1) if options.dask is None else _cluster(options.dask) as its:
+        try:
+            sweep(study, its, out, limit_s, so_far.take)
+        except BrokenExecutor as error:
+            raise Failed(f"the workers have ended, the same command continues the sweep: {error}") from None
+        except KeyboardInterrupt:
+            typer.echo(f"interrupted, the same command continues the sweep: {so_far.last.text}", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+    last = so_far.last
+    typer.echo(f"{last.text}, in {out}: {last.ended} in {last.elapsed_s:.1f} s, {last.wall_s:.1f} s of work")
+    raise typer.Exit(FAILED if last.failed else DONE)
+
+
+class _Progress:
+    """Writes a line of progress a second."""
+
+    def __init__(self) -> None:
+        self.last: Progress
+        self._line_s = time.monotonic() + LINE_S
+
+    def take(self, progress: Progress) -> None:
+        self.last = progress
+        if time.monotonic() >= self._line_s:
+            self._line_s = time.monotonic() + LINE_S
+            typer.echo(progress.text, err=True)
+
+
+def _study(options: SweepOptions) -> Study:
+    """Return the study of the options, which go before those of a study file. Raises Refused."""
+    known, file, sets = read_study(options.file), options.file, options.sets
+    vary: dict[str, list[object]] = {}
+    duration, seeds = options.duration, options.seeds or "1"
+    if known is not None:
+        file, sets, vary = file.parent / known.deployment, (*known.sets, *sets), {**known.vary}
+        duration, seeds = duration or known.duration, options.seeds or str(known.seeds)
+    if duration is None:
+        raise BadValue("--for is missing: the simulated time of each run, e.g. --for 60s")
+    for one in options.vary:
+        path, equals, values = one.partition("=")
+        if not equals:
+            raise BadValue("--vary: not of the form PATH=VALUE,VALUE", one)
+        vary[path] = [*read_at(f"--vary: {path}", values_of, values)]
+    return study_of(file, duration, vary, read_at("--seeds", seeds_of, seeds), sets)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    """Give the executor of a Dask cluster. Raises Failed."""
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise Failed("--dask needs Dask: pip install 'foosim[dask]'") from None
+    try:
+        client = distributed.Client(address, timeout=CONNECT)
+    except (OSError, ValueError) as error:
+        raise Failed(f"--dask: {address}: no scheduler answers, {error}") from None
+    with client:
+        yield client.get_executor()
