@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Final
 
@@ -26,17 +27,16 @@ from foosim import Player, Turn
 import math, os, time
 class Odd(Player):
     def __init__(self, deployment, parameters):
-        self.does, self.seed = parameters["does"], deployment.seed
+        self.does = parameters["does"]
     def act(self, tick, samples):
         turn = Turn({})
         turn.report("tick", tick)
-        if self.seed == 2:
-            exec(self.does)
+        exec(self.does)
         return turn
 """
 
 
-def study(vary: dict[str, Sequence[object]], seeds: Sequence[int] = (1,), *sets: str, file: Path = TABLE) -> Study:
+def study(vary: Mapping[str, Sequence[object]], seeds: Sequence[int] = (1,), *sets: str, file: Path = TABLE) -> Study:
     return study_of(file, "100ms", vary, seeds, (*PURE, *sets))
 
 
@@ -44,38 +44,39 @@ class Stopped(Exception):
     """A sweep was interrupted."""
 
 
-@pytest.mark.parametrize("ending", [".csv", ".jsonl", ".parquet"])
 def test_a_sweep_that_was_interrupted_and_extended_has_the_table_of_one_that_was_not(
-    ending: str, tmp_path: Path, whole: Table
+    tmp_path: Path, whole: Table, executor: Executor
 ) -> None:
-    """Its rows are those of rehearsals, in the order of the study."""
-    out = tmp_path / f"results{ending}"
+    """In the order of the study, whatever the file."""
+    out = tmp_path / "results.csv"
+    ran: list[Progress] = []
 
     def stop(progress: Progress) -> None:
         if progress.ended == 1:
             raise Stopped
 
-    ran: list[Progress] = []
-    with executor_here(2) as executor:
-        with pytest.raises(Stopped):
-            sweep(study(VARY, [2]), executor, out, progress=stop)
-        assert len(read_table(out).rows) == 1
-        sweep(study(VARY, [2]), executor, out)
-        again = sweep(study({RATE: VARY[RATE], DELAY: VARY[DELAY]}, [1, 2]), executor, out, progress=ran.append)
-    assert [progress.known for progress in ran] == [4] * 5, "rows that exist are not run again"
+    with pytest.raises(Stopped):
+        sweep(study(VARY, [2]), executor, out, progress=stop)
+    assert len(read_table(out).rows) == 1
+    again = sweep(study({RATE: VARY[RATE], DELAY: VARY[DELAY]}, [1, 2]), executor, out, progress=ran.append)
+    assert [progress.known for progress in ran] == [1] * 8, "rows that exist are not run again"
     assert [row[DELAY] for row in again.rows[::2]] == ["0ms", "30ms"] * 2, "the order is that of the last study"
-    write_table(tmp_path / f"whole{ending}", whole)
-    found = read_table(tmp_path / f"whole{ending}")
-    assert found.columns == whole.columns
-    assert (
-        found.rows == whole.rows == sorted(read_table(out).rows, key=lambda row: (row[DELAY], row[RATE], row["seed"]))
-    )
+    order = sorted(read_table(out).rows, key=lambda row: (row[DELAY], row[RATE], row["seed"]))
+    for ending in (".csv", ".jsonl", ".parquet"):
+        write_table(tmp_path / f"whole{ending}", whole)
+        found = read_table(tmp_path / f"whole{ending}")
+        assert found.columns == whole.columns and found.rows == whole.rows == order
 
 
 @pytest.fixture(scope="module")
-def whole() -> Table:
-    with executor_here(2) as executor:
-        return sweep(study(VARY, [1, 2]), executor)
+def executor() -> Iterator[Executor]:
+    with executor_here(2) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def whole(executor: Executor) -> Table:
+    return sweep(study(VARY, [1, 2]), executor)
 
 
 def test_a_row_has_the_figures_of_a_rehearsal(whole: Table) -> None:
@@ -91,33 +92,33 @@ def test_a_row_has_the_figures_of_a_rehearsal(whole: Table) -> None:
     assert [*frame.columns] == [*whole.columns] and frame["score.red"].tolist() == whole["score.red"].tolist()
 
 
-@pytest.mark.parametrize(
-    ("does", "message"),
-    [
-        ("1 / 0", "player-red failed at tick 6: ZeroDivisionError"),
-        ("turn.report('shots', math.nan)", "shots"),
-        ("os._exit(3)", "its process ended with exit code 3"),
-        ("os.kill(os.getpid(), 9)", "its process was killed by SIGKILL"),
-        ("time.sleep(600)", "not done after 3 s of wall time, its process was killed"),
-    ],
-)
-def test_a_run_that_fails_costs_its_row(does: str, message: str, tmp_path: Path) -> None:
+def test_a_run_that_fails_costs_its_row(tmp_path: Path, executor: Executor) -> None:
     (tmp_path / "odd_player.py").write_text(PLAYER)
-    (tmp_path / "table.yaml").write_bytes(TABLE.read_bytes())
-    sets = "players.player-red.class=odd_player:Odd", f"players.player-red.parameters={{does: {does!r}}}"
-    chosen = study({}, [1, 2, 3], *sets, "deadlines.lockstep_fast=60 s", file=tmp_path / "table.yaml")
-    with executor_here(1) as executor:
-        first, bad, last = sweep(chosen, executor, tmp_path / "results.csv", limit_s=3.0).rows
-    assert message in bad["message"] and not bad["digest"] and "ticks" not in bad
-    for row in (first, last):
-        assert not row["message"] and row["players.player-red.tick"] >= 40.0
-    assert read_table(tmp_path / "results.csv").rows == [first, bad, last]
-    assert np.isnan(read_table(tmp_path / "results.csv")["players.player-red.tick"]).tolist() == [False, True, False]
+    file = tmp_path / "table.yaml"
+    file.write_bytes(TABLE.read_bytes())
+    fates = {
+        "1 / 0": "player-red failed at tick 6: ZeroDivisionError",
+        "turn.report('shots', math.nan)": "player-red failed at tick 6: BadValue: metric shots",
+        "os._exit(3)": "its process ended with exit code 3",
+        "os.kill(os.getpid(), 9)": "its process was killed by SIGKILL",
+        "turn.report('shots', 1.5)": "",
+    }
+    does = "players.player-red.parameters.does"
+    sets = "players.player-red.class=odd_player:Odd", "players.player-red.parameters={does: ''}"
+    rows = sweep(study({does: [*fates]}, [2], *sets, file=file), executor, tmp_path / "results.csv").rows
+    hangs = study({}, [2], *sets, f"{does}=time.sleep(600)", "deadlines.lockstep_fast=60 s", file=file)
+    (late,) = sweep(hangs, executor, limit_s=0.5).rows
+    assert late["message"] == "not done after 0.5 s of wall time, its process was killed"
+    for row, message in zip(rows, fates.values(), strict=True):
+        assert row["message"].startswith(message) and bool(row["message"]) == bool(message)
+        assert bool(row["digest"]) == ("ticks" in row) == (not message)
+    assert rows[-1]["players.player-red.tick"] >= 40.0 and rows[-1]["players.player-red.shots"] == 1.5
+    table = read_table(tmp_path / "results.csv")
+    assert table.rows == rows and np.isnan(table["players.player-red.tick"]).tolist() == [True] * 4 + [False]
 
 
-def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why() -> None:
-    with executor_here(1) as executor:
-        rows = sweep(study({"table.ball.mass": ["heavy", "21 g"]}), executor).rows
+def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why(executor: Executor) -> None:
+    rows = sweep(study({"table.ball.mass": ["heavy", "21 g"]}), executor).rows
     assert "table.ball.mass" in rows[0]["message"] and not rows[1]["message"]
 
 
