@@ -89,7 +89,7 @@ def _figures(run: Run, begun_s: float) -> tuple[dict[str, Any], str]:
     metrics: dict[str, float | None] = {**found["metrics"], **rules.counts, "quarantined": len(found["quarantined"])}
     bad = [name for name, value in metrics.items() if value is None]
     message = found["reason"] if found["failed"] else ""
-    message = message or (f"metrics that are not finite: {', '.join(bad)}" if bad else "")
+    message = message or (f"not finite: {', '.join(bad)}" if bad else "")
     return {
         **{name: float(value) for name, value in metrics.items() if value is not None},
         "ticks": found["ticks"] - found["first_tick"],
