@@ -127,6 +127,7 @@ SHELLS = {
     "simulation/study/table.py",
     "simulation/workers.py",
     "cli/sweep.py",
+    "cli/sweep_results.py",
     "cli/match/command.py",
     "simulation/env/__init__.py",
     "simulation/env/episodes.py",
