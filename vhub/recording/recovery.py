@@ -170,7 +170,7 @@ class _Completion:
             flights = state.in_flight()
             for flight in flights:
                 flight.cause = IN_FLIGHT
-            ages, metrics = state.ages.unreported(state.closed), state.metrics.take(state.closed)
+            ages, metrics = state.ages.unreported(state.closed), state.metrics.unreported(state.closed)
             end = Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages, metrics=metrics)
             file.write(tick_of(end, self._deployment))
 

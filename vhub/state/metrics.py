@@ -52,10 +52,14 @@ class Metrics:
 
     def take(self, tick: int) -> list[Metric]:
         """Return the figures of the network that have changed since they were taken last."""
-        figures = self._figures()
-        changed = [Metric(max(tick, 0), *one) for one in figures.items() if self._taken.get(one[0]) != one[1]]
-        self._taken = figures
+        changed = self.unreported(tick)
+        self._taken |= {one.name: one.value for one in changed}
         return changed
+
+    def unreported(self, tick: int) -> list[Metric]:
+        """Return what `take` would, and leave the state as it is."""
+        figures = self._figures().items()
+        return [Metric(max(tick, 0), name, value) for name, value in figures if self._taken.get(name) != value]
 
     def values(self) -> dict[str, float]:
         """Return all metrics, by name."""
@@ -81,7 +85,7 @@ class Metrics:
     def state(self) -> MetricsState:
         """Return the snapshot."""
         reported = [(client, dict(sorted(metrics.items()))) for client, metrics in sorted(self.reported.items())]
-        return MetricsState(reported, sorted(self.channels.items()), self._taken)
+        return MetricsState(reported, sorted(self.channels.items()), dict(sorted(self._taken.items())))
 
     def restore(self, state: MetricsState) -> None:
         """Restore a snapshot."""

@@ -161,7 +161,7 @@ def last_closings(
     if not closings and closed is not None:
         closings.append(_unjudged(state, commits, closed, now_ns))
     for closing in closings[-1:]:
-        closing.ages, closing.metrics = state.ages.unreported(state.closed), state.metrics.take(state.closed)
+        closing.ages, closing.metrics = state.ages.unreported(state.closed), state.metrics.unreported(state.closed)
         for flight in state.in_flight():
             left = flight_of(state_of(flight))
             left.cause = IN_FLIGHT
