@@ -103,13 +103,14 @@ def opened(path: Path, stop: int | None = None) -> Iterator[tuple[BinaryIO, int]
 
 
 def head_of(path: Path) -> dict[str, str]:
-    """Return the metadata at a file's beginning; empty without it. Raises CaptureError."""
+    """Return the metadata at a file's beginning; empty where its description is cut. Raises CaptureError."""
+    head: dict[str, str] = {}
     with opened(path) as (stream, size):
         for content in McapFile(stream, size, str(path)).contents() if size >= len(MAGIC) else ():
+            if isinstance(content, Message) or (isinstance(content, records.Metadata) and content.name == CHECKS):
+                return head
             if isinstance(content, records.Metadata) and content.name == METADATA:
-                return content.metadata
-            if isinstance(content, Message):
-                break
+                head = content.metadata
     return {}
 
 

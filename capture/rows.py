@@ -237,6 +237,20 @@ class AgeRow(Row, frozen=True):
     counts: list[int]
 
 
+class MetricRow(Row, frozen=True):
+    """The value of a metric from the closing of `tick` on. `players.CLIENT.NAME` is what a player or client reports,
+    with a row for each change. `network.CHANNEL.loss`, `.delay_ms` and `.age_ms` are figures of the run so far over all
+    links; changed ones have rows each second of simulated time and at the end.
+
+    `loss` is the share of packets that were dropped of those whose fate is final, without duplicates that links made,
+    `delay_ms` the mean of due less sent of the delivered ones, `age_ms` the mean age at use.
+    """
+
+    tick: Counter
+    name: str
+    value: float
+
+
 class OwnerRow(Row, frozen=True):
     """A robot and the node that owns it."""
 
@@ -282,6 +296,7 @@ TICK: Final = "/tick"
 LAYOUT: Final = "/layout"
 FRAME: Final = "/frame"
 AGES: Final = "/ages"
+METRICS: Final = "/metrics"
 PACKETS: Final = "/packets"
 CLIENTS: Final = "/clients"
 
@@ -293,6 +308,7 @@ ROW_TYPES: Final[Mapping[str, type[Row]]] = {
     TICK: TickRow,
     FRAME: FrameRow,
     AGES: AgeRow,
+    METRICS: MetricRow,
     PACKETS: PacketRow,
 }
 """The type of the rows of each topic."""

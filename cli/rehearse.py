@@ -26,6 +26,7 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import load_deployment
 from foosim.launcher.plan import Plan, check_models_here, check_players_here, check_rooms, make_plan
 from foosim.launcher.run_options import RunOptions
+from foosim.protocol.run_status import reported_text
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.simulation.attendant import Interrupts
 from foosim.simulation.check.component_check import ComponentCheck, used_component_type
@@ -130,7 +131,8 @@ def _text(result: dict[str, Any]) -> str:
     return (
         f"{seconds:.2f} s simulated at {result['rtf']}x{summary}\n"
         f"{handovers}packets {packets}; packets refused {refused}\n"
-        f"digest of all ticks {result['digest']['chain']}"
+        + "".join(f"{line}\n" for line in reported_text(result["metrics"]))
+        + f"digest of all ticks {result['digest']['chain']}"
         + (f"\nthe rehearsal has failed: {result['reason']}" if result["failed"] else "")
         + (f"\ncapture {result['capture']}" if result["capture"] else "")
     )

@@ -101,7 +101,12 @@ class Foosim(Verbs):
             **dict.fromkeys(("stop", "start", "balance"), "cli.control"),
         },
         "Before a run": dict.fromkeys(("check", "components", "components check", "urdf", "schema"), "cli.check"),
-        "In one process": {"rehearse": "cli.rehearse", "match": "cli.match.command", "sweep": "cli.sweep"},
+        "In one process": {
+            "rehearse": "cli.rehearse",
+            "match": "cli.match.command",
+            "sweep": "cli.sweep",
+            **dict.fromkeys(("sweep table", "sweep plot"), "cli.sweep_results"),
+        },
         "Captures and networks": {"capture": "cli.capture.command", "net": "cli.net"},
         "Other simulators": {"morse": "cli.morse"},
         "Machines and measurements": {"pki": "cli.pki", "doctor": "cli.doctor", "fit": "fitting.main"},

@@ -41,7 +41,7 @@ from foosim.client.errors import (
 )
 from foosim.client.jobs import Job, Jobs
 from foosim.client.packets import check_packet, check_subscription
-from foosim.client.player import Commands, Packet, Sample
+from foosim.client.player import Commands, Packet, Sample, metric_of
 from foosim.client.playing import NS_PER_S, Newest
 from foosim.common import limits
 from foosim.common.closable import Closable
@@ -396,6 +396,16 @@ class Client(Closable):
         Each of them is one packet on a link of its own: some may get it, others not.
         """
         self.send("", channel, payload)
+
+    def report(self, name: str, value: float) -> None:
+        """Report a metric, a number of the run's result, of which the last value counts; see `Turn.report`.
+
+        In lockstep it is sent with the tick. Raises BadValue for an invalid name or value and for too many names,
+        NotJoined, RunEnded.
+        """
+        self._check_sending()
+        self._core.report({name: metric_of(name, value)})
+        self._link.perform()
 
     def receive(self, timeout_s: float = 1.0) -> list[Arrived]:
         """After `listen`: return the arrived packets, after at most `timeout_s` of wall time.

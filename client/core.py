@@ -10,7 +10,7 @@ restarts with hello and resumes at its numbers.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, MutableMapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,7 +19,7 @@ from msgspec import structs
 from foosim.client.errors import PacketError
 from foosim.client.files import ClientFiles, are_drawn
 from foosim.client.packets import check_packet, check_subscription, split
-from foosim.client.player import Packet
+from foosim.client.player import Packet, keep_metrics
 from foosim.common import limits
 from foosim.common.errors import DeploymentError, Malformed
 from foosim.deployment.loader import load_deployment
@@ -118,10 +118,10 @@ class ClientCore:
         self._on_arrival = False
         self._sequence = self.first_sequence = 0
         """The number of its last packet; and of the last one of processes before it, whose place it takes."""
-        self._downlink = 0
-        self._gaps: set[int] = set()
-        self._done = b""
-        self._done_number = -1
+        self._downlink, self._gaps = 0, set[int]()
+        self._metrics, self._changed = dict[str, float](), dict[str, float]()
+        """The last value of each metric that the client has reported; in lockstep, what the next answer has."""
+        self._done, self._done_number = b"", -1
         self._downlinks = self._repeated = self._missing = self._malformed = self._overflowed = 0
         self._received = self._sent = self._answered = self._unsent = self._returns = 0
         self._readers: dict[type[Any], Callable[[Any], None]] = {
@@ -248,11 +248,12 @@ class ClientCore:
         assert self.go is not None and self.deployment is not None, "nothing to answer"
         # A packet's stamp is its tick's time: with a wall clock's, two equal runs would not give equal bytes.
         sent = self._numbered(packets, self.go.tick * self.deployment.tick_ns)
-        payload = encode(Done(self.name, self.boot, self.go.tick, sent))
+        payload = encode(Done(self.name, self.boot, self.go.tick, sent, [*self._changed.items()]))
         if len(payload) > channels.UP.bytes_max:
             raise PacketError(f"{len(payload)} bytes in one answer, at most {channels.UP.bytes_max} are allowed")
         self._count_sent(sent)
         self._done, self._done_number = payload, self.go.number
+        self._changed = {}
         self.go = None
         self._answered += 1
         self._publish(payload)
@@ -280,6 +281,17 @@ class ClientCore:
             return
         for part in split(sent, channels.UP.bytes_max):
             self._publish(encode(Up(self.name, self.boot, part)))
+
+    def report(self, metrics: Mapping[str, float]) -> None:
+        """Report metrics: in lockstep with the next answer, else at once. Raises BadValue for too many names."""
+        changed = {name: value for name, value in metrics.items() if self._metrics.get(name) != value}
+        if not changed:
+            return
+        keep_metrics(self._metrics, changed)
+        if self._period:
+            self._changed |= changed
+        elif not self.is_away:
+            self._publish(encode(Up(self.name, self.boot, [], [*changed.items()])))
 
     def fail(self, reason: str, trace: str = "") -> None:
         """Report that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
@@ -323,6 +335,10 @@ class ClientCore:
             self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         self._recorded(welcome.sequence)
         self._resend(whole=True)
+        if self._period:  # it may not have recorded what was reported before
+            self._changed = dict(self._metrics)
+        elif self._metrics:
+            self._publish(encode(Up(self.name, self.boot, [], [*self._metrics.items()])))
         self.actions.append(Log("info", "the vHub is back"))
 
     def _on_refusal(self, refusal: ClientRefusal) -> None:

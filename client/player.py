@@ -7,13 +7,17 @@ parameters. `client.playing` runs it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import isfinite
+from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from msgspec import Struct
 from mypy_extensions import mypyc_attr
 
+from foosim.common import limits
 from foosim.common.errors import BadValue
+from foosim.common.names import NAME_RULE, is_name
 from foosim.world.component_types.payloads import Value
 
 if TYPE_CHECKING:
@@ -67,10 +71,40 @@ Commands: TypeAlias = Mapping[str, Command]
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Result of a player that also sends packets: its commands, and the packets in the order of sending."""
+    """Result of a player that also sends packets, in their order, or reports metrics, beside its commands."""
 
     commands: Commands
     packets: Sequence[Packet] = ()
+    metrics: dict[str, float] = field(default_factory=dict)
+    """What `report` was called with."""
+
+    def report(self, name: str, value: float) -> None:
+        """Report a metric, a number of the run's result: the last value of each name is in it. A bool is 0 or 1.
+
+        No packet carries it, so that the network is the same with and without it. Raises BadValue for an invalid name,
+        and for a value other than a finite number.
+        """
+        self.metrics[name] = metric_of(name, value)
+
+
+def metric_of(name: object, value: object) -> float:
+    """Return the value of a metric as a number. Raises BadValue as `Turn.report`."""
+    if not isinstance(name, str) or not is_name(name):
+        raise BadValue(f"not a name of a metric: {NAME_RULE}", name)
+    try:
+        number = float(value) if isinstance(value, Real) else None
+    except OverflowError:
+        number = None
+    if number is None or not isfinite(number):
+        raise BadValue(f"metric {name} is no finite int, float or bool", value)
+    return number
+
+
+def keep_metrics(kept: dict[str, float], new: Mapping[str, float]) -> None:
+    """Add metrics to the earlier ones of the same client. Raises BadValue for too many names."""
+    if len(kept.keys() | new.keys()) > limits.METRICS_MAX:
+        raise BadValue(f"a client reports at most {limits.METRICS_MAX} metrics; one more is", [*new][-1])
+    kept.update(new)
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)

@@ -14,8 +14,8 @@ from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError, Unanswered
 from foosim.client.loading import load_player
 from foosim.client.packets import check_packet
-from foosim.client.player import Packet, Player, Sample, Turn
-from foosim.common.errors import Malformed, Refused, UnknownName
+from foosim.client.player import Packet, Player, Sample, Turn, keep_metrics
+from foosim.common.errors import BadValue, Malformed, Refused, UnknownName
 from foosim.deployment.channel_kinds import Channel, channels_of
 from foosim.deployment.schema import Deployment
 from foosim.deployment.schema import Player as Declaration
@@ -73,6 +73,8 @@ class Acting:
         """The (endpoint, channel) that it subscribes to."""
         self._deployment = deployment
         self._load = load
+        self.metrics: dict[str, float] = {}
+        """The last value of each metric that it has reported."""
         self._known: tuple[int | str, ...] = ()
         """The tick since which the player exists, and its robots that are absent, once it has acted."""
         self.player = self._make(tick)
@@ -120,6 +122,11 @@ class Acting:
             raise PlayerError(f"{where}: {failure_of(error, _module_of(self.declared))}") from error
         if not isinstance(turn, Turn):
             turn = Turn(turn)
+        elif turn.metrics:
+            try:
+                keep_metrics(self.metrics, turn.metrics)
+            except BadValue as error:
+                raise PlayerError(f"{where}: {error}{place_of_code(self.player.act)}") from error
         return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]
 
     def _packets(self, packets: object, where: str) -> list[Packet]:
@@ -223,6 +230,7 @@ class PlayerLoop:
         """Call the player and send its packets."""
         assert self._acting is not None
         core, packets = self.core, self._acting.act(tick)
+        core.report(self._acting.metrics)
         try:
             if core.go is not None:
                 core.done(packets)

@@ -5,7 +5,7 @@ A limit bounds the cost of a wrong or hostile peer, file or request. A refusal n
 
 from typing import Final
 
-PROTOCOL_VERSION: Final = 6
+PROTOCOL_VERSION: Final = 7
 """Version of the messages; a peer with another one is refused at the handshake, both versions named."""
 
 NAME_LENGTH_MAX: Final = 32
@@ -18,6 +18,12 @@ COMPONENT_NAME_MAX: Final = 400
 """Characters of a component with its module and class, and of its version."""
 NODES_MAX: Final = 256
 CLIENTS_MAX: Final = 1024
+METRICS_MAX: Final = 64
+"""Metrics that one client may report, by name."""
+METRICS_OF_RUN_MAX: Final = 2_048
+"""The same of all clients of a run: they fit a report of the vHub."""
+METRIC_CHANNELS_MAX: Final = 256
+"""Channels with figures of their own in the metrics of the network; further ones share theirs."""
 OPERATORS_MAX: Final = 64
 WATCHED_MAX: Final = 64
 """Links and readings that viewers watch at once."""

@@ -22,6 +22,7 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
     **dict.fromkeys(("run", "world", "seed", "ticks", "first_tick", "tick_ns", "rtf", "lag_ms", "lateness_ms")),
     "digest": None,
     "packets": NO_PACKETS,
+    "metrics": {},
     "commands": NO_COMMANDS,
     "recording": NOT_RECORDED,
     "from": None,

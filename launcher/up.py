@@ -31,6 +31,7 @@ from foosim.launcher.plan import Plan
 from foosim.launcher.processes import Child, Launcher
 from foosim.launcher.run_options import launch_of
 from foosim.protocol.channels import SUPERVISOR, VHUB
+from foosim.protocol.run_status import reported_text
 from foosim.runtime.command import DONE, FAILED, REFUSED
 from foosim.runtime.early_signals import handling
 from foosim.runtime.run_folder import RunFolder, RunInfo, create_run
@@ -536,6 +537,7 @@ class Up:
                 self.folder.write_result(result)
         summary = [", ".join(result["summary"])] if result["summary"] else []
         lines = [*map(recovery_text, result["recoveries"][self._shown :]), line, *summary]
+        lines += reported_text(result["metrics"])
         return Outcome(result, (*lines, *self._lost_lines(result), *self._capture_lines()))
 
     def unended(self, reason: str) -> dict[str, Any]:

@@ -389,21 +389,27 @@ class Join(Message, frozen=True):
     hub: Annotated[str, Meta(max_length=limits.NAME_LENGTH_MAX)] = ""
 
 
+Metrics = Annotated[list[tuple[Name, float]], Meta(max_length=limits.METRICS_MAX)]
+"""Numbers of the run's result that a client reports, with their names. They are no packets, and have no numbers."""
+
+
 class Up(Message, frozen=True):
     """Packets of a free-running client, numbered without gaps; the vHub accepts none after a gap."""
 
     name: Name
     boot: Name
     packets: Packets
+    metrics: Metrics = field(default_factory=list)
 
 
 class Done(Message, frozen=True):
-    """A lockstep client's answer to `Go(tick)`: the packets that it sends at that tick."""
+    """A lockstep client's answer to `Go(tick)`: the packets that it sends at that tick, and changed metrics."""
 
     name: Name
     boot: Name
     tick: Counter
     packets: Packets
+    metrics: Metrics = field(default_factory=list)
 
 
 class Received(Item, frozen=True):

@@ -13,7 +13,7 @@ from foosim.protocol.channels import SUPERVISOR, VHUB
 from foosim.protocol.run_status import NO_PACKETS, NOT_RECORDED, UNFINISHED
 from foosim.supervisor.progress import ProgressMonitor
 from foosim.supervisor.state import RunState
-from foosim.world.assembly.world import world_status, world_texts
+from foosim.world.assembly.world import status_numbers, world_status, world_texts
 from foosim.world.frame import Frame
 
 
@@ -48,6 +48,7 @@ def result(state: RunState) -> dict[str, Any]:
         "lateness_ms": report.get("lateness_ms"),
         "digest": {"frame": frame.digest.hex(), "chain": state.chain.hex()},
         "packets": report.get("packets", NO_PACKETS),
+        "metrics": {**status_numbers(shown), **report.get("metrics", {})},
         "recording": _recording(state),
         "from": None if origin is None else {"capture": origin.source, "tick": origin.tick},
         "nodes": {

@@ -129,6 +129,7 @@ SHELLS = {
     "simulation/workers.py",
     "cli/executor.py",
     "cli/sweep.py",
+    "cli/sweep_results.py",
     "cli/match/command.py",
     "simulation/env/__init__.py",
     "simulation/env/episodes.py",

@@ -8,10 +8,12 @@ processes may have to be started.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import isfinite
 from typing import Final
 
 from foosim.common import limits
 from foosim.common.errors import Malformed
+from foosim.common.names import is_name
 from foosim.common.units import parse_pace
 from foosim.protocol import channels
 from foosim.protocol.actions import Action, Journal, Publish
@@ -186,6 +188,7 @@ class Clients:
         if self._sessions.is_in_doubt(session, self._state.deployment):
             self.repeated += 1
             return
+        self._take_metrics(up)
         if not self._sessions.admits(session, len(up.packets), len(payload)):
             self._state.reject_on_receipt("inbox_full", len(up.packets))
             return
@@ -203,11 +206,31 @@ class Clients:
         if not is_current or not session.is_present:
             self.repeated += 1
             return
+        self._take_metrics(done)
         self.take_done(done.name)
         session.answered()
         if session.away_ns >= 0:  # it lives, and has to come back
             session.leave(session.back_ns, now_ns)
         session.done = done
+
+    def _take_metrics(self, message: Up | Done) -> None:
+        """Keep what a client reports for the next closing that hears clients. Raises Malformed.
+
+        A player with more names than a run may have ends the run; another client's message is dropped.
+        """
+        metrics, waiting = message.metrics, self._sessions.reports
+        if not metrics or self._state is None:
+            return
+        for name, value in metrics:
+            if not is_name(name) or not isfinite(value):
+                raise Malformed(f"{message.name} reports a metric {name!r} of {value}")
+        known = {(who, one) for all in (self._state.metrics.reported, waiting) for who in all for one in all[who]}
+        if len(known | {(message.name, name) for name, _ in metrics}) > limits.METRICS_OF_RUN_MAX:
+            problem = f"{message.name} reports more metrics; a run has at most {limits.METRICS_OF_RUN_MAX}"
+            if message.name in self._state.deployment.players:
+                self._give_up(problem)
+            raise Malformed(problem)
+        waiting.setdefault(message.name, {}).update(metrics)
 
     def take_done(self, client: str) -> None:
         """End a tick's wait for this client."""

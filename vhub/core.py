@@ -386,13 +386,13 @@ class HubCore:
         tick = world.frame.tick
         self._report_waits(now_ns)
         self.clients.leave_owing(state, world.closing)
-        admitted = self.sessions.take_sent() if state.hears_clients else {}
+        admitted, reports = self.sessions.take_sent() if state.hears_clients else ({}, {})
         samples = self._samples.pop(tick, [])
-        deliveries = state.close_robots(world.frame, admitted)
+        deliveries = state.close_robots(world.frame, admitted, reports)
         payload = encode(deliveries)
         for name in world.free:
             state.members[name].downlink += 1
-        record = tick_record(world.closing, world.commit, samples, admitted, state, payload)
+        record = tick_record(world.closing, world.commit, samples, admitted, state, payload, reports)
         self.actions.append(Journal(record))
         self.clients.send_owed(world.closing, now_ns)
         self.clients.report()
@@ -428,7 +428,7 @@ class HubCore:
                 flight.released_wall_ns = world.sent_ns
         if self.watching.links:
             self.watching.judged(world.closing.fates)
-        world.closing.ages = state.aged
+        world.closing.ages, world.closing.metrics = state.aged, state.measured
         self._unrecorded.append(world.closing)
         self._record(releases)
         self._world = None
@@ -697,8 +697,8 @@ class HubCore:
         refused, absences = self.refusals.by_sender(), {"boot": self.member.boot, **self.clients.absences.report()}
         if self.state is None or self.releases is None:
             return encode_json({"refused": refused})
-        links = self.link_lines.lines(self.state, self.watching.links, anew=is_last)
-        parts = links, self.watching.report(self.state), absences, self.releases.lateness, self.shell
+        lines = self.link_lines.lines(self.state, self.watching.links, anew=is_last)
+        parts = lines, self.watching.report(self.state), absences, self.releases.lateness, self.shell
         return report(self.state, refused, *parts)
 
     # --- the end -----------------------------------------------------------------------------------------------------

@@ -224,6 +224,8 @@ class Sessions:
         self.by_name: dict[str, Session] = {}
         self.joins: dict[str, Joining] = {}
         """Joins that wait for a tick, by client."""
+        self.reports: dict[str, dict[str, float]] = {}
+        """Values of metrics that clients have reported between closings."""
         self.downlinks = Downlinks()
         self._waiting_bytes = 0
         """Size of the packets of all clients between two closings."""
@@ -382,8 +384,8 @@ class Sessions:
         self._waiting_bytes, session.inbox_bytes = whole, of_it
         return True
 
-    def take_sent(self) -> dict[str, list[Sent]]:
-        """Remove and return the packets since the last call, by client.
+    def take_sent(self) -> tuple[dict[str, list[Sent]], dict[str, dict[str, float]]]:
+        """Remove and return the packets and the values of metrics since the last call, by client.
 
         Packets of a client whose join waits for its tick wait too: the state has the client from that tick on.
         """
@@ -398,7 +400,8 @@ class Sessions:
             if packets:
                 taken[name] = taken.get(name, []) + packets
         self._waiting_bytes = sum(session.inbox_bytes for session in self.by_name.values())
-        return taken
+        reports, self.reports = self.reports, {}
+        return taken, reports
 
     def send_go(self, session: Session, go: Go) -> None:
         """Send a lockstep client its Go; one that is away receives it after its return."""

@@ -30,17 +30,19 @@ class ShellStatus:
 
 
 class LinkLines:
-    """The lines of links, which several heartbeats share: for hundreds of links they cost as much as a few ticks."""
+    """The lines of links and the metrics, which several heartbeats share: for hundreds of links they cost as much as a
+    few ticks."""
 
     def __init__(self) -> None:
-        self._lines = msgspec.Raw(b"[]")
+        self._lines: dict[str, msgspec.Raw] = {}
         self._heartbeats = 0
 
-    def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> msgspec.Raw:
-        """Return the lines as JSON for one more heartbeat, renewed when they are due: the links with the most traffic
-        and the watched ones."""
+    def lines(self, state: HubState, watched: Collection[tuple[str, str]], *, anew: bool) -> Mapping[str, msgspec.Raw]:
+        """Return `links` and `metrics` as JSON for one more heartbeat, renewed when they are due: the links with the
+        most traffic and the watched ones."""
         if anew or self._heartbeats % LINKS_REPORTED_EVERY == 0:
-            self._lines = msgspec.Raw(encode_json(_links(state, watched)))
+            parts = {"links": _links(state, watched), "metrics": state.metrics.values()}
+            self._lines = {name: msgspec.Raw(encode_json(part)) for name, part in parts.items()}
         self._heartbeats += 1
         return self._lines
 
@@ -48,7 +50,7 @@ class LinkLines:
 def report(
     state: HubState,
     refused: Mapping[str, Any],
-    links: msgspec.Raw,
+    lines: Mapping[str, msgspec.Raw],
     watched: Mapping[str, Any],
     absences: Mapping[str, Any],
     lateness: Lags,
@@ -56,8 +58,9 @@ def report(
 ) -> bytes:
     """Return the statistics, the addresses of the radio plane and the capture, and the state of the recording.
 
-    `links` are the links with the most traffic, and the watched ones: [from, to, offered, delivered, dropped, mean
-    delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use], and `links_in_all` how many had any.
+    `lines` are of `LinkLines`. Its `links` are the links with the most traffic, and the watched ones: [from, to,
+    offered, delivered, dropped, mean delay in ns, rule, how long its queue is in ns, dropped by cause, ages at use],
+    and `links_in_all` how many had any.
     Ages at use are [channel, uses, p50 in ns, p99 in ns] of each channel that goes by the link. `refused` counts
     messages by channel and sender, `refusals` packets by reason; `lateness_ms` is how late packets left in realtime,
     null if none did. Watched links and readings are under `watched` (`WatchList.report`).
@@ -74,7 +77,7 @@ def report(
             },
             "refused": refused,
             "refusals": state.refusals,
-            "links": links,
+            **lines,
             "links_in_all": len(state.fabric.states),
             "clients": sorted(state.members),
             **watched,

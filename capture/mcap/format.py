@@ -270,7 +270,7 @@ class McapFile:
         elif opcode == Opcode.CHUNK:
             yield from self._messages(unpack_chunk(content, f"{self._name}: byte {self.at}"))
         elif opcode == Opcode.MESSAGE:
-            yield from self._messages(RECORD.pack(opcode, len(content)) + content)
+            raise ValueError("a message outside of a chunk, which no checksum covers")
         elif opcode == Opcode.CHANNEL:
             self._declare(content)
         elif opcode == Opcode.METADATA:

@@ -86,11 +86,10 @@ def _figures(run: Run, begun_s: float) -> tuple[dict[str, Any], str]:
     except Exception as error:  # noqa: BLE001  # a fault of foosim or a component in this run: others may have none
         traceback.print_exc()
         return {}, f"{type(error).__name__}: {error}"
-    metrics: dict[str, float | None] = {**found["metrics"], **rules.counts}
+    metrics: dict[str, float | None] = {**found["metrics"], **rules.counts, "quarantined": len(found["quarantined"])}
     bad = [name for name, value in metrics.items() if value is None]
     message = found["reason"] if found["failed"] else ""
-    message = message or (f"in quarantine: {', '.join(found['quarantined'])}" if found["quarantined"] else "")
-    message = message or (f"metrics that are not finite: {', '.join(bad)}" if bad else "")
+    message = message or (f"not finite: {', '.join(bad)}" if bad else "")
     return {
         **{name: float(value) for name, value in metrics.items() if value is not None},
         "ticks": found["ticks"] - found["first_tick"],

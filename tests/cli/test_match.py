@@ -118,7 +118,8 @@ def test_an_interrupted_match_shows_what_has_been_played(command: Command, monke
         for number, game in enumerate(runs):
             if number == 2:
                 raise KeyboardInterrupt
-            yield game, Ran({"score.red": 2, "score.blue": 1, "ticks": 5, "digest": "", "marks.away": 0}, "")
+            red, blue = (1, 2) if game.is_swapped else (2, 1)
+            yield game, Ran({"score.red": red, "score.blue": blue, "ticks": 5, "digest": "", "marks.out": 0}, "")
 
     monkeypatch.setattr(match, "outcomes", outcomes)
     done = command("team", "passive", "--games", "9", *SHORT)

@@ -64,5 +64,6 @@ def test_a_match_without_matplotlib_plays_no_game(
 
 def test_commands_do_not_import_matplotlib() -> None:
     """It takes half a second, and may not be installed."""
-    program = "import sys, foosim.cli.match.command, foosim.cli.capture.command\nassert 'matplotlib' not in sys.modules"
+    modules = ", ".join(f"foosim.cli.{name}" for name in ("match.command", "capture.command", "sweep_results"))
+    program = f"import sys, {modules}\nassert 'matplotlib' not in sys.modules"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

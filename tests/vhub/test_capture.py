@@ -193,6 +193,7 @@ def test_the_summary_of_a_capture(path: Path, hub_run: HubRun) -> None:
         "/frame": 8,
         "/layout": 1,
         "/log": 3,
+        "/metrics": 12,
         "/packets": account.offered,
         "/recoveries": 3,
         "/scene": 3,

@@ -20,7 +20,7 @@ from foosim.capture import index as capture_index
 from foosim.capture.index import UNSYNCED_BYTES
 from foosim.capture.info import capture_info
 from foosim.capture.mcap.checks import CaptureError
-from foosim.capture.mcap.format import MAGIC, Message
+from foosim.capture.mcap.format import MAGIC, McapFile, Message
 from foosim.capture.parts import Joined, files_from, first_there
 from foosim.capture.reader import open_capture
 from foosim.common.errors import Failed, Refused
@@ -105,7 +105,7 @@ def read_by_others(path: Path) -> int:
 
 def first_chunk(content: bytes) -> int:
     """Return how many bytes of a capture describe it."""
-    return content.index(b"versions.json") + 2000
+    return content.index(b"versions.json") + 2100
 
 
 def journal_until(run: HubRun, tick: int) -> list[bytes]:
@@ -214,6 +214,11 @@ def test_a_restarted_vhub_writes_what_is_missing_wherever_it_was_killed(
         for file, content in before.items():
             assert file.read_bytes() == content or open_capture(file).finished, "what was left stays as it is"
         for file in after[1:]:
+            content = before.get(file, b"")
+            if content and not any(
+                isinstance(one, Message) for one in McapFile(BytesIO(content), len(content), "").contents()
+            ):
+                continue  # its writer was killed within its first chunk: the next file has its rows
             alone = open_capture(file)
             assert alone.frames.ticks[0] == alone.ticks[0] and capture_info(file).chain == capture_info(path).chain
 

@@ -19,6 +19,7 @@ from foosim.capture.file import Entry, epoch_row
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.rows import (
     AGES,
+    METRICS,
     NOTHING_MORE,
     PACKETS,
     ROW_TYPES,
@@ -107,7 +108,7 @@ def test_a_run_that_ends_within_a_tick_has_the_fates_of_the_half_that_was_closed
 def test_a_frame_that_is_known_brings_its_packets_alone(hub_run: HubRun) -> None:
     last = hub_run.closings[-1]
     rest = world_rows(last, hub_run.deployment, last.frame)
-    assert last.fates and {topic for topic, *_ in rest} == {AGES}, "and ages at use since the last second"
+    assert last.fates and {topic for topic, *_ in rest} == {AGES, METRICS}, "and ages at use since the last second"
 
 
 def test_rows_stand_at_their_simulated_times(hub_run: HubRun, entries: list[Entry]) -> None:

@@ -139,7 +139,7 @@ def greeted(hello: ClientHello, state: HubState | None = None, sessions: Session
 
 
 REFUSED: Final[dict[str, tuple[dict[str, Any], str]]] = {
-    "version": ({"version": 7}, f"protocol version 7, this is {limits.PROTOCOL_VERSION}"),
+    "version": ({"version": 9}, f"protocol version 9, this is {limits.PROTOCOL_VERSION}"),
     "world": ({"world": "mars"}, "world mars, this is table"),
     "name": ({"name": "eear"}, "no client eear is declared; declared are ear, eye, hand, knee, nearest is ear"),
     "a robot's name": ({"name": "camera"}, "no client camera is declared; declared are ear, eye, hand, knee"),

@@ -78,9 +78,13 @@ class Ages:
                 recent = heard.recent
                 recent[age] = recent.get(age, 0) + 1
 
+    def is_row_due(self, tick: int) -> bool:
+        """Whether rows are due after the closing of a tick."""
+        return (tick + 1) % self._every == 0
+
     def take(self, tick: int) -> list[Age]:
         """Return the counts since the last row, when another one is due after the closing of a tick."""
-        if (tick + 1) % self._every:
+        if not self.is_row_due(tick):
             return []
         taken = self.unreported(tick)
         for pairs in self._heard.values():
@@ -110,6 +114,18 @@ class Ages:
             if counts:
                 found.append(Age(tick, client, heard.source, heard.channel, counts))
         return found
+
+    def means_ns(self) -> dict[str, float]:
+        """Return the mean age of each channel at all its clients, over the whole run."""
+        uses: dict[str, int] = {}
+        sums: dict[str, int] = {}
+        for pairs in self._heard.values():
+            for heard in pairs.values():
+                for counts in (heard.whole, heard.recent):
+                    for age, count in counts.items():
+                        uses[heard.channel] = uses.get(heard.channel, 0) + count
+                        sums[heard.channel] = sums.get(heard.channel, 0) + age * count
+        return {channel: sums[channel] * self._tick_ns / count for channel, count in uses.items()}
 
     def state(self) -> list[tuple[str, list[HeardState]]]:
         """Return the snapshot."""

@@ -231,6 +231,24 @@ class Age(msgspec.Struct, frozen=True):
     counts: Counts
 
 
+class ChannelCounts(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
+    """What became of the packets of a channel over all links, without duplicates that links made."""
+
+    delivered: int = 0
+    dropped: int = 0
+    delay_ns: int = 0
+    """Sum of (due - sent) over delivered packets."""
+
+
+class MetricsState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """The metrics of a run: the last values that each client reported, the counts of each channel, and the network's
+    figures in the last rows of them."""
+
+    reported: list[tuple[str, dict[str, float]]]
+    channels: list[tuple[str, ChannelCounts]]
+    taken: dict[str, float]
+
+
 class Joining(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A client that joins (again): period and offset in ticks (0: free-running), what it subscribes to, and of that at
     the arrival of what it acts, if it does."""
@@ -276,4 +294,5 @@ class Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     deliveries: list[tuple[int, list[Delivered]]]
     final: tuple[int, bool]
     ages: list[tuple[str, list[HeardState]]]
+    metrics: MetricsState
     flights: list[FlightState]

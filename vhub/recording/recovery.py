@@ -170,8 +170,8 @@ class _Completion:
             flights = state.in_flight()
             for flight in flights:
                 flight.cause = IN_FLIGHT
-            ages = state.ages.unreported(state.closed)
-            end = Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages)
+            ages, metrics = state.ages.unreported(state.closed), state.metrics.unreported(state.closed)
+            end = Closing(closing.frame, closing.digest, [], [], fates=flights, ages=ages, metrics=metrics)
             file.write(tick_of(end, self._deployment))
 
     def _folded(self, file: CaptureFile) -> Iterator[bytes]:

@@ -18,6 +18,7 @@ from foosim.capture.rows import (
     CLIENTS,
     FRAME,
     LAYOUT,
+    METRICS,
     PACKETS,
     RECOVERIES,
     TICK,
@@ -29,6 +30,7 @@ from foosim.capture.rows import (
     EntityRow,
     Fate,
     LayoutRow,
+    MetricRow,
     PacketRow,
     RecoveryRow,
     Row,
@@ -69,7 +71,11 @@ def world_rows(closing: Closing, deployment: Deployment, known: Frame | None) ->
         entries.append((TICK, at_ns, at_ns, mark, _tick_row(closing)))
         if known is None or frame.tick % deployment.capture.frames_every == 0:
             entries.append((FRAME, at_ns, at_ns, mark, frame_row(frame)))
-    return [*entries, *(_age_entry(age, tick_ns) for age in closing.ages)]
+    entries += [_age_entry(age, tick_ns) for age in closing.ages]
+    for one in closing.metrics:
+        its_ns = one.tick * tick_ns
+        entries.append((METRICS, its_ns, its_ns, one.tick & 0xFFFF_FFFF, MetricRow(*one)))
+    return entries
 
 
 def _age_entry(age: Age, tick_ns: int) -> Entry:

@@ -23,12 +23,13 @@ from foosim.protocol.messages import Deliveries, Sent
 from foosim.vhub.links.fabric import Fabric, Link
 from foosim.vhub.network.ages import Ages
 from foosim.vhub.network.draw_address import counts_within_channels, robot_number
-from foosim.vhub.network.memory import Age, Joining, Snapshot
+from foosim.vhub.network.memory import Age, ChannelCounts, Joining, Snapshot
 from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL
 from foosim.vhub.state.byte_limits import InFlightLimit, ReceiveBudget
 from foosim.vhub.state.existence import Existence
 from foosim.vhub.state.members import Here, Member
+from foosim.vhub.state.metrics import Metric, Metrics, Reports
 from foosim.world.edits import Disrupt, Edit
 from foosim.world.frame import Frame
 from foosim.world.robot_packets import Delivered, RobotPacket
@@ -66,6 +67,10 @@ class HubState:
         self.ages = Ages(self.tick_ns)
         self.aged: list[Age] = []
         """The rows of ages at use by the last closing."""
+        self.metrics = Metrics(self.ages)
+        self._channels = self.metrics.channels
+        self.measured: list[Metric] = []
+        """The metrics that have rows by the last closing."""
         self._flights: dict[int, list[Flight]] = {}
         """Packets in flight, by the tick of their arrival."""
         self._fates: list[list[Flight]] = []
@@ -171,16 +176,20 @@ class HubState:
         phase_ns = self.fabric.phase_ns
         return sorted(packets, key=lambda one: (phase_ns(one[0].robot), one[0].robot, one[0].index))
 
-    def close_clients(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight]) -> Deliveries:
-        """Phase two: judge the packets of clients, in (phase, source, sequence) order.
+    def close_clients(
+        self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], fates: list[Flight], reports: Reports | None = None
+    ) -> Deliveries:
+        """Phase two: judge the packets of clients, in (phase, source, sequence) order, and take what they report.
 
         Return the deliveries of the next tick.
         """
-        deliveries = self.close_robots(frame, admitted)
+        deliveries = self.close_robots(frame, admitted, reports)
         fates += self.close_rest()
         return deliveries
 
-    def close_robots(self, frame: Frame, admitted: Mapping[str, Sequence[Sent]]) -> Deliveries:
+    def close_robots(
+        self, frame: Frame, admitted: Mapping[str, Sequence[Sent]], reports: Reports | None = None
+    ) -> Deliveries:
         """The part of phase two that robots wait for: return the deliveries of the next tick; `close_rest` follows.
 
         Packets to robots are judged first, since nodes wait for these; the costly verdicts of a broadcast by radio to
@@ -222,6 +231,7 @@ class HubState:
             self._send_waiting(tick)
         self.closed = tick
         self.aged = self.ages.take(tick)
+        self.measured = self.metrics.report(tick, reports) if reports else []
         arrived: list[Flight] = []
         self._fates.append(arrived)
         deliveries = self._arrive_at_robots(tick + 1, arrived)
@@ -238,6 +248,8 @@ class HubState:
     def close_rest(self) -> list[Flight]:
         """Judge the packets that `close_robots` has deferred; return all whose fate phase two has made final."""
         self._send_waiting(self.closed)
+        if self.ages.is_row_due(self.closed):
+            self.measured = [*self.measured, *self.metrics.take(self.closed)]
         return [*chain.from_iterable(self._fates)]
 
     def _send_waiting(self, tick: int) -> None:
@@ -348,7 +360,9 @@ class HubState:
                 is_under_way = False
                 link.drop(flight, TRANSIT_FULL)
             if not is_under_way:
-                self.packets.dropped += is_offered
+                if is_offered:
+                    self.packets.dropped += 1
+                    self._counts(flight.channel).dropped += 1
                 fates.append(flight)
                 continue
             is_sensed = flight.source in self._robots and flight.destination in self.members
@@ -411,9 +425,19 @@ class HubState:
         link = self.fabric.link(flight.source, flight.destination, flight.channel)
         is_delivered = link.arrive(flight, hindered)
         if flight.copy == 0:
-            self.packets.delivered += is_delivered
-            self.packets.dropped += not is_delivered
+            counts = self._counts(flight.channel)
+            if is_delivered:
+                self.packets.delivered += 1
+                counts.delivered += 1
+                counts.delay_ns += flight.due_ns - flight.sent_ns
+            else:
+                self.packets.dropped += 1
+                counts.dropped += 1
         return is_delivered
+
+    def _counts(self, channel: str) -> ChannelCounts:
+        """Return the counts of a channel."""
+        return self._channels.get(channel) or self.metrics.counts(channel)
 
     def _take_arrivals(self, tick: int, to_robots: bool) -> list[Flight]:
         """Remove and return the arrivals of `tick` at robots, or at clients, in (due, source, sequence, copy) order."""
@@ -514,6 +538,7 @@ class HubState:
                 "deliveries": sorted(self.deliveries.items()),
                 "final": [self.final, self.was_final],
                 "ages": self.ages.state(),
+                "metrics": self.metrics.state(),
                 "flights": [state_of(flight) for flight in self.in_flight()],
             }
         )
@@ -533,6 +558,7 @@ class HubState:
         state.deliveries = dict(content.deliveries)
         state.final, state.was_final = content.final
         state.ages.restore(content.ages)
+        state.metrics.restore(content.metrics)
         if not {state.closed, state.closed + 1} <= state.deliveries.keys():
             raise Malformed(f"a state after tick {state.closed} without the deliveries of that tick and the next")
         ends = {(source, destination) for source, destination, _ in state.fabric.states}

@@ -22,6 +22,7 @@ from foosim.vhub.network.memory import Age, Joining
 from foosim.vhub.network.packet import IN_FLIGHT, Flight, flight_of, state_of
 from foosim.vhub.state.commits import Commits, Committed
 from foosim.vhub.state.hub_state import HubState
+from foosim.vhub.state.metrics import Metric, Reports
 from foosim.world.assembly.initial_state import first_chain
 from foosim.world.edits import Edit
 from foosim.world.frame import CHAIN_START, Frame, chain_next, frame_from_bytes
@@ -81,7 +82,8 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     """One closed tick: commit and samples as received, admitted packets, joins and leaves, and the result.
 
     `refused` counts by cause what was refused at the door since the tick before. `owing` left while the tick waited for
-    their Dones: they were sent its Go, and have left when the packets of clients are judged.
+    their Dones: they were sent its Go, and have left when the packets of clients are judged. `reports` are values of
+    metrics, by client.
     """
 
     tick: int
@@ -93,6 +95,7 @@ class TickRecord(msgspec.Struct, frozen=True, array_like=True, tag="tick", forbi
     refused: list[tuple[str, int]]
     deliveries: bytes
     owing: list[str] = []
+    reports: dict[str, dict[str, float]] = {}
 
 
 HubRecord = HeadRecord | TickRecord | InputsRecord | AbsencesRecord | Epoch
@@ -121,6 +124,8 @@ class Closing:
     """What the robots sent at this frame, in (robot, index) order."""
     ages: Sequence[Age] = ()
     """Ages at use since the last rows of them, where this closing has rows."""
+    metrics: Sequence[Metric] = ()
+    """Changes of what clients reported, and of the network's figures where this closing has rows of them."""
 
 
 def closing_of(
@@ -156,7 +161,7 @@ def last_closings(
     if not closings and closed is not None:
         closings.append(_unjudged(state, commits, closed, now_ns))
     for closing in closings[-1:]:
-        closing.ages = state.ages.unreported(state.closed)
+        closing.ages, closing.metrics = state.ages.unreported(state.closed), state.metrics.unreported(state.closed)
         for flight in state.in_flight():
             left = flight_of(state_of(flight))
             left.cause = IN_FLIGHT
@@ -176,12 +181,13 @@ def tick_record(
     admitted: Mapping[str, list[Sent]],
     state: HubState,
     deliveries: bytes,
+    reports: Reports,
 ) -> bytes:
     """Return the record of a closing, which is journalled before its deliveries are sent."""
     sampled = [raw for raw, message in samples if message.digest == closing.digest]
     clients = sorted(admitted.items()), closing.joins, closing.leaves
     given = state.counted_rejections, deliveries, closing.owing
-    return encode(TickRecord(closing.frame.tick, commit, sampled, *clients, *given))
+    return encode(TickRecord(closing.frame.tick, commit, sampled, *clients, *given, reports))
 
 
 def world_packets(
@@ -277,8 +283,8 @@ class Fold:
         closing.owing += record.owing
         for name in record.owing:
             state.leave(name)
-        deliveries = state.close_clients(frame, dict(record.admitted), closing.fates)
-        closing.ages = state.aged
+        deliveries = state.close_clients(frame, dict(record.admitted), closing.fates, record.reports)
+        closing.ages, closing.metrics = state.aged, state.measured
         if encode(deliveries) != record.deliveries:
             raise Malformed(f"record {record.tick} of the vHub's journal: its inputs give other deliveries")
         self.commit, self.inputs = record.commit, None

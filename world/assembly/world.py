@@ -140,6 +140,20 @@ def world_status(spec: WorldSpec, frame: Frame) -> dict[str, Any]:
     return status
 
 
+def status_numbers(status: Mapping[str, Any], start: str = "") -> dict[str, float | None]:
+    """Return the numbers of a status, named by their keys joined by dots. A boolean is 0 or 1.
+
+    None stands for infinity and NaN.
+    """
+    found: dict[str, float | None] = {}
+    for key, value in status.items():
+        if isinstance(value, Mapping):
+            found |= status_numbers(value, f"{start}{key}.")
+        elif isinstance(value, bool | int | float):
+            found[f"{start}{key}"] = None if isinstance(value, float) and not isfinite(value) else value + 0
+    return found
+
+
 def with_status(spec: WorldSpec, frame: Frame) -> list[tuple[str, Any, Any]]:
     """Return the label of each rule of the world and each kit, the object, and what its `status` reads."""
     view = View(frame.tick, frame.numbers)
