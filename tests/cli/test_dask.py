@@ -7,15 +7,16 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from subprocess import DEVNULL
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-import distributed
 import pytest
 
 from tests.conftest import Command, Typed
 
+distributed: Any = import_module("distributed")  # half of it has types
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
 SHORT: Final = ("--vary", "network.links.0.delay=0ms,30ms", "--seeds", "1..2", "--for", "100ms", "--set", "engine=pure")
 KILLS: Final = """

@@ -146,7 +146,7 @@ def test_an_executor_that_ends_or_has_another_version_makes_no_row(tmp_path: Pat
     with pytest.raises(BrokenExecutor, match="were cancelled"):
         sweep(study({}, [5]), ends, tmp_path / "results.csv")
     older = replace(study({}, range(5)), version="0.0.1")
-    with pytest.raises(OtherVersion, match="the study has 0.0.1"):
+    with pytest.raises(OtherVersion, match=r"the study has 0\.0\.1"):
         sweep(older, executor, tmp_path / "results.csv")
     assert not [*tmp_path.iterdir()]
 
