@@ -146,7 +146,7 @@ def read_study(file: Path) -> StudyFile | None:
     try:
         return msgspec.convert(content, StudyFile)
     except msgspec.ValidationError as error:
-        raise BadValue(f"{file}: {error}") from None
+        raise BadValue(f"{file}: {error} (the keys are deployment, for, vary, seeds and set)") from None
 
 
 def text_of(value: object) -> str:
