@@ -29,11 +29,11 @@ LIMIT_S: Final = 3600.0
 
 @dataclass(slots=True)
 class Progress:
-    """How far a sweep is: runs of the study, of these ended, failed, and their wall time in all."""
+    """How far a sweep is: runs of the study, those that the results had before, those that ended since `begun_s`, all
+    failed ones of the results, and the wall time of the ended ones in all."""
 
     runs: int
     known: int
-    """Rows that the results had before."""
     begun_s: float
     ended: int = 0
     failed: int = 0
@@ -118,7 +118,8 @@ def sweep(
     and after Ctrl-C.
     """
     results = Results(study, out)
-    so_far = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic())
+    failed = sum(bool(row["message"]) for row in results.table.rows)
+    so_far = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic(), failed=failed)
     progress(so_far)
     try:
         with closing(outcomes(results.missing, executor, limit_s)) as found:
