@@ -208,5 +208,5 @@ def test_an_external_client_reports(lockstep: bool) -> None:
     settings = Settings(clients={"hand": program})
     clients = ["engine=pure", "players={}", f"clients={{hand: {declared}}}"]
     pace = Pace("fast" if lockstep else "realtime")
-    found = rehearse(TABLE.read_text(), TABLE.name, 100, 1, clients, settings, pace=pace)
-    assert program.is_over and found.json["metrics"]["players.hand.goals"] == (180.0 if lockstep else 4.0)
+    found = rehearse(TABLE.read_text(), TABLE.name, TICKS, 1, clients, settings, pace=pace)
+    assert program.is_over and found.json["metrics"]["players.hand.goals"] == (1100.0 if lockstep else 4.0)
