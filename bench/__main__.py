@@ -26,6 +26,7 @@ from bench import (
     realtime,
     rendering,
     spares,
+    sweep,
     table_one_process,
     verdict,
     yarp,
@@ -83,6 +84,7 @@ BENCHES: Final = (
     Bench("env", "steps of an environment for learning, and of two processes", with_default(env.env), env.lines),
     Bench("answers", "when a job is known to be taken", with_default(answers.answers), answers.lines),
     Bench("lateness", "when packets leave against when they are due", with_default(lateness.lateness), lateness.lines),
+    Bench("sweep", "a hundred runs of a sweep in two processes", with_default(sweep.swept), sweep.lines),
     Bench("yarp", "bottles between ports of YARP, and through a run", with_default(yarp.yarp), yarp.lines),
 )
 

@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, Executor
-from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated
 
 import typer
 
+from foosim.cli.executor import DaskOption, JobsOption, executor_of
 from foosim.cli.run_command import with_options
-from foosim.common.errors import BadValue, Failed, read_at
+from foosim.common.errors import BadValue, read_at
 from foosim.common.units import parse_ns
 from foosim.runtime.command import DONE, FAILED, INTERRUPTED, new_app
 from foosim.simulation.attendant import LINE_S
 from foosim.simulation.study.study import Study, read_study, seeds_of, study_of, values_of
 from foosim.simulation.study.sweep import LIMIT_S, Progress, sweep
-from foosim.simulation.workers import executor_here
-
-CONNECT: Final = "10s"
 
 app = new_app()
 
@@ -47,12 +40,8 @@ class SweepOptions:
     out: Annotated[
         Path | None, typer.Option("--out", help="Results, .csv, .jsonl or .parquet; by default NAME-sweep.csv.")
     ] = None
-    jobs: Annotated[
-        int | None, typer.Option("--jobs", help="Number of processes; by default that of the processors.", min=1)
-    ] = None
-    dask: Annotated[
-        str | None, typer.Option("--dask", metavar="ADDRESS", help="Use the workers of this Dask scheduler.")
-    ] = None
+    jobs: JobsOption = None
+    dask: DaskOption = None
     limit: Annotated[str, typer.Option("--limit", metavar="TIME", help="Wall time that a run may take.")] = (
         f"{LIMIT_S:g}s"
     )
@@ -76,14 +65,10 @@ def sweep_command(options: SweepOptions) -> None:
     study = _study(options)
     out = options.out or Path(f"{options.file.stem}-sweep.csv")
     limit_s = read_at("--limit", parse_ns, options.limit) / 1e9
-    if options.dask is not None and options.jobs is not None:
-        raise BadValue("--jobs: the workers of --dask are those of its cluster", options.jobs)
     so_far = _Progress()
-    with executor_here(options.jobs or os.cpu_count() or 1) if options.dask is None else _cluster(options.dask) as its:
+    with executor_of(options.jobs, options.dask) as executor:
         try:
-            sweep(study, its, out, limit_s, so_far.take)
-        except BrokenExecutor as error:
-            raise Failed(f"the workers have ended, the same command continues the sweep: {error}") from None
+            sweep(study, executor, out, limit_s, so_far.take)
         except KeyboardInterrupt:
             typer.echo(f"interrupted, the same command continues the sweep: {so_far.last.text}", err=True)
             raise typer.Exit(INTERRUPTED) from None
@@ -122,18 +107,3 @@ def _study(options: SweepOptions) -> Study:
             raise BadValue("--vary: not of the form PATH=VALUE,VALUE", one)
         vary[path] = [*read_at(f"--vary: {path}", values_of, values)]
     return study_of(file, duration, vary, read_at("--seeds", seeds_of, seeds), sets)
-
-
-@contextmanager
-def _cluster(address: str) -> Iterator[Executor]:
-    """Give the executor of a Dask cluster. Raises Failed."""
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise Failed("--dask needs Dask: pip install 'foosim[dask]'") from None
-    try:
-        client = distributed.Client(address, timeout=CONNECT)
-    except (OSError, ValueError) as error:
-        raise Failed(f"--dask: {address}: no scheduler answers, {error}") from None
-    with client:
-        yield client.get_executor()

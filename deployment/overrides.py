@@ -23,7 +23,7 @@ from fnmatch import fnmatchcase
 from typing import Any, Final
 
 from foosim.common.errors import DeploymentError, UnknownName, describe, show
-from foosim.common.names import nearest_name
+from foosim.common.names import nearest_name, quoted
 from foosim.deployment.components import SECTIONS
 from foosim.deployment.schema import Deployment
 from foosim.deployment.text.expand import ENTRIES, Expansion
@@ -49,6 +49,7 @@ NAMED: Final = {TEMPLATES, *ENTRIES, *SECTIONS, "nodes", "gateways", "hosts", "r
 """The sections whose keys are names."""
 
 _STEP = re.compile(r'(?:"(?P<quoted>[^"]*)"|(?P<plain>[^".=\[\]]+))')
+_PATTERN = re.compile(r"[*?]")
 _INDEX = re.compile(r"\[(?P<index>[0-9]+)\]")
 
 
@@ -147,19 +148,18 @@ def _read_value(text: str, start: int, number: int) -> tuple[Tree | None, list[P
 
 def _paths(taken: "_Taken", steps: Sequence[tuple[str, int]]) -> list[list[tuple[str, int]]]:
     """The paths that the steps stand for: themselves where none of them is a pattern."""
-    if not any(_is_pattern(step) for step, _ in steps):
+    if not any(_PATTERN.search(step) for step, _ in steps):
         return [[*steps]]
     missed: dict[int, set[str]] = {}
     if not (paths := _matching(taken, steps, 0, missed)) and None not in taken.sections.values():
         last = max(missed)
-        path = ".".join(step for step, _ in steps[:last])
-        text = str(UnknownName("nothing matches", steps[last][0], missed[last]))
-        raise _Misplaced(steps[last][1], f"{path}: {text}" if path else text)
+        raise _misplaced(steps, last, str(UnknownName("nothing matches", steps[last][0], missed[last])))
     return paths
 
 
-def _is_pattern(step: str) -> bool:
-    return "*" in step or "?" in step
+def _misplaced(steps: Sequence[tuple[str, int]], index: int, text: str) -> _Misplaced:
+    path = ".".join(step for step, _ in steps[:index])
+    return _Misplaced(steps[index][1], f"{path}: {text}" if path else text)
 
 
 def _matching(
@@ -178,7 +178,7 @@ def _matching(
         text = ".".join(step for step, _ in steps[index:stop])
         if text in keys:
             matches = [keys[text]]
-        elif _is_pattern(text):
+        elif _PATTERN.search(text):
             matches = list(dict.fromkeys(key for name, key in keys.items() if fnmatchcase(name, text)))
         else:
             is_new = isinstance(there, Fields) and index + 1 == stop == len(steps)
@@ -283,9 +283,7 @@ def _open(taken: _Taken, node: Fields, key: str, steps: Sequence[tuple[str, int]
         name = ".".join(step for step, _ in steps[index:stop])
         if nearest is None and (nearest := nearest_name(name, {*node.values, *names})) is not None:
             key = name
-    path = ".".join(step for step, _ in steps[:index])
-    text = describe("unknown key", key, None if nearest is None else repr(nearest))
-    raise _Misplaced(steps[index][1], f"{path}: {text}" if path else text)
+    raise _misplaced(steps, index, describe("unknown key", key, quoted(nearest)))
 
 
 def _entry(node: Items, step: str, column: int) -> int:

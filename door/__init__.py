@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from foosim import components, env, gateway
     from foosim._capture import Capture, open_capture
     from foosim._rehearse import load_deployment, rehearse
+    from foosim._sweep import sweep
     from foosim.client.client import Client, connect
     from foosim.client.jobs import Jobs
     from foosim.client.player import Commands, Packet, Player, Sample, Samples, Turn
@@ -47,10 +48,12 @@ __all__ = [
     "load_deployment",
     "open_capture",
     "rehearse",
+    "sweep",
 ]
 _MODULES = {
     "foosim._capture": ("Capture", "open_capture"),
     "foosim._rehearse": ("load_deployment", "rehearse"),
+    "foosim._sweep": ("sweep",),
     "foosim.client.client": ("Client", "connect"),
     "foosim.client.jobs": ("Jobs",),
     "foosim.client.player": ("Commands", "Packet", "Player", "Sample", "Samples", "Turn"),

@@ -12,7 +12,7 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager, redirect_stdout
 from multiprocessing.connection import Connection
@@ -147,26 +147,6 @@ def executor_here(jobs: int) -> Iterator[Executor]:
         pool.shutdown(wait=False, cancel_futures=True)
         children.end()
         pool.shutdown()
-
-
-def in_processes(
-    work: Callable[[Item], Result], items: Sequence[Item], jobs: int, what: str
-) -> Generator[Result, None, None]:
-    """Do some work for each item in `jobs` processes of their own, and yield the results in the order of the items.
-
-    One job is this process. The processes end with the iterator, also amid an item. Raises Failed when one of them was
-    killed; `what` is named there: `a process of WHAT was killed`.
-    """
-    if jobs == 1:
-        yield from map(work, items)
-        return
-    with executor_here(jobs) as pool:
-        pending = [pool.submit(apart, work, item) for item in items]
-        try:
-            yield from (one.result() for one in pending)
-        except Lost:
-            few = f"fewer than --jobs {jobs} need less memory"
-            raise Failed(f"a process of {what} was killed; {few}") from None
 
 
 # --- in a child -------------------------------------------------------------------------------------------------------

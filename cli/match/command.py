@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
+from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -15,6 +14,7 @@ import typer
 
 from foosim.analysis.picture import HELP, check_picture, new_picture
 from foosim.capture.new_file import check_absent
+from foosim.cli.executor import DaskOption, JobsOption, executor_of
 from foosim.cli.match.shown import Match, as_json, drawn_title, line, show, who
 from foosim.cli.run_command import with_options
 from foosim.client.loading import look_in
@@ -24,10 +24,10 @@ from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, check_engine, load_deployment
 from foosim.deployment.text.files import read_source_file
-from foosim.runtime.command import DONE, FAILED, INTERRUPTED, REFUSED, JsonOption, new_app, print_json
+from foosim.runtime.command import DONE, FAILED, INTERRUPTED, JsonOption, new_app, print_json
 from foosim.simulation.match.figures import draw, figures
-from foosim.simulation.match.game import Fixture, Game, Link, Played, entrant, play, seats, sets_of
-from foosim.simulation.workers import in_processes
+from foosim.simulation.match.game import Fixture, Game, Link, Played, entrant, played, run_of, seats, sets_of
+from foosim.simulation.study.sweep import LIMIT_S, outcomes
 
 TABLE: Final = Path("deploy/table.yaml")
 SIDES: Final = {"a": (0,), "b": (1,), "both": (0, 1)}
@@ -47,9 +47,8 @@ class MatchOptions:
     minutes: Annotated[float, typer.Option("--minutes", help="Simulated length of a game.", min=0.001, max=1000)] = 5.0
     seed: Annotated[int, typer.Option("--seed", help="Seed of the first game.", min=0)] = 1
     keep_sides: Annotated[bool, typer.Option("--keep-sides", help="Do not change sides in every second game.")] = False
-    jobs: Annotated[
-        int | None, typer.Option("--jobs", help="Number of processes; by default that of the processors.", min=1)
-    ] = None
+    jobs: JobsOption = None
+    dask: DaskOption = None
     deployment: Annotated[Path, typer.Option("--deployment", help="The deployment file to play.")] = TABLE
     sets: Annotated[
         tuple[str, ...],
@@ -88,11 +87,11 @@ def foosim_match(
 
     Ctrl-C ends the match with the games so far.
 
-    Exit codes: 0 done, 1 a player has failed, 2 bad input, 3 a capture exists or cannot be written, 130 Ctrl-C.
+    Exit codes: 0 done, 1 a game has failed, 2 bad input, 3 a capture exists, 130 Ctrl-C.
     """
     match = _checked(options)
-    jobs = min(options.jobs or os.cpu_count() or 1, len(match.games))
-    raise typer.Exit(_play(match, jobs, options.drawing, json))
+    with executor_of(options.jobs, options.dask) as executor:
+        raise typer.Exit(_play(match, executor, options.drawing, json))
 
 
 def _checked(options: MatchOptions) -> Match:
@@ -126,29 +125,31 @@ def _checked(options: MatchOptions) -> Match:
     return Match(entrants, fixture, tuple(games), deployment.tick_ns, (first, second), options.worse_for)
 
 
-def _play(match: Match, jobs: int, drawing: Path | None, json: bool) -> int:
+def _play(match: Match, executor: Executor, drawing: Path | None, json: bool) -> int:
     """Play the games and show them; return the exit code."""
-    played: list[Played] = []
+    results: dict[Game, Played] = {}
     code = DONE
-    with closing(in_processes(partial(play, match.fixture), match.games, jobs, "the match")) as results:
+    with closing(outcomes({game: run_of(match.fixture, game) for game in match.games}, executor, LIMIT_S)) as found:
         try:
-            for game in results:
-                if game.failed:
-                    typer.echo(f"seed {game.seed}, {who(match, game)}: {game.failed}", err=True)
-                    code = REFUSED if game.refused else FAILED
+            for game, outcome in found:
+                result = played(match.fixture, game, outcome)
+                if result.failed:
+                    typer.echo(f"seed {game.seed}, {who(match, result)}: {result.failed}", err=True)
+                    code = FAILED
                     break
-                played.append(game)
-                typer.echo(line(match, game, len(played)), err=True)
+                results[game] = result
+                typer.echo(line(match, result, len(results)), err=True)
         except KeyboardInterrupt:
-            typer.echo(f"interrupted after {len(played)} of {len(match.games)} games", err=True)
+            typer.echo(f"interrupted after {len(results)} of {len(match.games)} games", err=True)
             code = INTERRUPTED
-    cells = [(link, figures(list(games), match.tick_ns)) for link, games in groupby(played, key=lambda one: one.link)]
+    shown = [results[game] for game in match.games if game in results]
+    cells = [(link, figures(list(games), match.tick_ns)) for link, games in groupby(shown, key=lambda one: one.link)]
     if drawing is not None and code == DONE:
         drawn = [(link, found) for link, found in cells if link is not None]
         with new_picture(drawing) as figure:
             draw(figure, drawn, match.labels, drawn_title(match))
     if json:
-        print_json(as_json(match, played, cells))
+        print_json(as_json(match, shown, cells))
     elif cells:
         show(match, cells)
     return code

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import yaml
 
-from foosim.capture.mcap.checks import CaptureError
 from foosim.client.loading import class_faults
-from foosim.common.errors import BadValue, Refused, UnknownName
+from foosim.common.errors import BadValue, UnknownName
 from foosim.common.units import format_ns
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.library.table.players import OF_THE_TABLE
-from foosim.simulation.run import rehearse
-from foosim.simulation.system import Settings, System
+from foosim.simulation.study.run import Ran, Run, version_here
 from foosim.world.assembly.initial_state import initial_frame
-from foosim.world.assembly.world import WorldMarks, mark_kinds, world_status
-from foosim.world.frame import Frame
+from foosim.world.assembly.world import mark_kinds, world_status
 
 IMPORT_S: Final = 60.0
 """How long the modules of the players may take to be imported."""
@@ -73,10 +69,6 @@ def seats(deployment: Deployment, file: str) -> dict[str, str]:
     return found
 
 
-OVER: Final = "is_over"
-"""Where the status of a world has whether the match is over."""
-OVER_TICKS: Final = 100
-"""Interval in ticks between looks at that."""
 AWAY: Final = "away"
 """How marks look of what has left its place, and is put back."""
 
@@ -138,39 +130,25 @@ class Played:
     ticks: int
     digest: str
     failed: str = ""
-    refused: bool = False
-    """Whether the game could not be played for its capture."""
     link: Link | None = field(default=None)
 
 
-def play(fixture: Fixture, game: Game) -> Played:
-    """Play a game, until it is over by the rules or its ticks have passed.
+def run_of(fixture: Fixture, game: Game) -> Run:
+    """Return a game as a run of a study."""
+    sets = tuple(sets_of(fixture, game))
+    return Run(fixture.text, fixture.name, fixture.folder, sets, fixture.ticks, version_here(), game.capture)
 
-    One whose player fails, or whose capture cannot be written, is `failed`.
-    """
-    sets = sets_of(fixture, game)
-    text = apply_sets(fixture.text, fixture.name, sets)
-    look = _Looking(fixture.deployment(text))
-    settings = Settings(run=f"match-{game.seed}", on_commit=look.commit)
-    try:
-        found: dict[str, Any] = rehearse(
-            text,
-            fixture.name,
-            fixture.ticks,
-            1,
-            settings=settings,
-            prepare=look.attend,
-            capture=game.capture,
-            folder=fixture.folder,
-        ).json
-    except (CaptureError, Refused) as error:
-        return Played(game.seed, game.is_swapped, (0, 0), 0, 0, "", str(error), isinstance(error, CaptureError))
-    points = points_of(found[SCORE], is_swapped=game.is_swapped)
-    failed = found["reason"] if found["failed"] else ""
-    ticks = found["ticks"] - found["first_tick"]
-    return Played(
-        game.seed, game.is_swapped, points, look.away, ticks, found["digest"]["chain"], failed, link=game.link
-    )
+
+def played(fixture: Fixture, game: Game, found: Ran) -> Played:
+    """Return a game's result from what became of its run."""
+    if found.message:
+        return Played(game.seed, game.is_swapped, (0, 0), 0, 0, "", found.message, link=game.link)
+    deployment, figures = fixture.deployment(fixture.text), found.figures
+    score = {side: int(figures[f"{SCORE}.{side}"]) for side in seats(deployment, fixture.name)}
+    away = sum(figures[f"marks.{name}"] for name, kind in mark_kinds(deployment).items() if kind.look == AWAY)
+    points = points_of(score, is_swapped=game.is_swapped)
+    ticks, digest = figures["ticks"], figures["digest"]
+    return Played(game.seed, game.is_swapped, points, int(away), ticks, digest, link=game.link)
 
 
 def points_of(score: Mapping[str, int], *, is_swapped: bool) -> tuple[int, int]:
@@ -199,31 +177,3 @@ def _links(fixture: Fixture, names: Sequence[str], link: Link) -> str:
         for way, ends in (("in", ("*", name)), ("out", (name, "*")))
     ]
     return yaml.safe_dump([*own, *kept], default_flow_style=True, width=1 << 30).strip()
-
-
-class _Looking:
-    """Counts what the rules mark as gone away, and ends a game that is over by the rules."""
-
-    def __init__(self, deployment: Deployment) -> None:
-        self.away = 0
-        self._deployment = deployment
-        self._kinds = {name for name, kind in mark_kinds(deployment).items() if kind.look == AWAY}
-        self._marks: WorldMarks | None = None
-        self._before: Frame | None = None
-        self._system: System | None = None
-
-    def attend(self, system: System) -> None:
-        """Take the system whose frames are to come."""
-        self._system = system
-
-    def commit(self, frame: Frame) -> None:
-        """Look at the frames in their order."""
-        if self._marks is None:
-            self._marks = WorldMarks(self._deployment, frame.layout)
-        elif self._before is not None:
-            self.away += sum(kind in self._kinds for _, kind, _ in self._marks.between(self._before, frame))
-        self._before = frame
-        system = self._system
-        if system is not None and frame.tick % OVER_TICKS == 0 and world_status(self._deployment, frame).get(OVER):
-            system.soon(partial(system.request, "down"))
-            self._system = None

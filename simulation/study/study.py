@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
-from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
@@ -25,27 +24,10 @@ from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, check_engine, load_deployment
 from foosim.deployment.text.files import read_deployment_text, read_source_file
-from foosim.protocol.fingerprint import library_fingerprint
+from foosim.simulation.study.run import Run, version_here
 
 SEED: Final = "seed"
 RUNS_MAX: Final = 1_000_000
-
-
-def version_here() -> str:
-    """Return the version of foosim on this machine, and of the arithmetic of its libraries: `0.2.0+1f0c59a2`."""
-    return f"{version('foosim')}+{library_fingerprint().hex()[:8]}"
-
-
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One run of a study: the deployment's text and name, its folder, what is set, how long it is, by which foosim."""
-
-    text: str
-    name: str
-    folder: Path
-    sets: tuple[str, ...]
-    ticks: int
-    version: str
 
 
 class StudyFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"duration": "for", "sets": "set"}):

@@ -7,18 +7,21 @@ its rows are not run again. It is written again as runs end, at most once a seco
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from foosim.capture.new_file import check_writable
 from foosim.common.errors import Refused
-from foosim.simulation.study.run import OtherVersion, Ran, ran
+from foosim.simulation.study.run import OtherVersion, Ran, Run, ran
 from foosim.simulation.study.study import SEED, Study
 from foosim.simulation.study.table import Row, Table, check_results, read_table, write_table
 from foosim.simulation.workers import apart
+
+Key = TypeVar("Key")
 
 WRITE_S: Final = 1.0
 LIMIT_S: Final = 3600.0
@@ -117,21 +120,29 @@ def sweep(
     results = Results(study, out)
     so_far = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic())
     progress(so_far)
-    keys: dict[Future[Ran], tuple[Any, ...]] = {}
     try:
-        for key, run in results.missing.items():
+        with closing(outcomes(results.missing, executor, limit_s)) as found:
+            for key, outcome in found:
+                results.add(key, outcome)
+                so_far.ended, so_far.failed = so_far.ended + 1, so_far.failed + bool(outcome.message)
+                so_far.wall_s += outcome.wall_s
+                progress(so_far)
+    finally:
+        results.write()
+    return results.table
+
+
+def outcomes(runs: Mapping[Key, Run], executor: Executor, limit_s: float) -> Generator[tuple[Key, Ran], None, None]:
+    """Do runs, and yield what becomes of each as it ends. It raises as `sweep` does."""
+    keys: dict[Future[Ran], Key] = {}
+    try:
+        for key, run in runs.items():
             keys[executor.submit(apart, ran, run, limit_s)] = key
         for done in as_completed(keys):
-            outcome = _outcome(done)
-            results.add(keys[done], outcome)
-            so_far.ended, so_far.failed = so_far.ended + 1, so_far.failed + bool(outcome.message)
-            so_far.wall_s += outcome.wall_s
-            progress(so_far)
+            yield keys[done], _outcome(done)
     finally:
         for future in keys:
             future.cancel()
-        results.write()
-    return results.table
 
 
 def _outcome(done: Future[Ran]) -> Ran:

@@ -9,14 +9,17 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from foosim.capture.new_file import written
-from foosim.common.errors import BadValue, Failed
+from foosim.common.errors import BadValue, Failed, UnknownName
 from foosim.simulation.study.study import SEED
 
 FATES: Final = ("offered", "delivered", "dropped", "in_flight", "refused")
@@ -45,6 +48,19 @@ class Table:
     def columns(self) -> tuple[str, ...]:
         """The names of all columns, in their order."""
         return (*self.parameters, SEED, *self.metrics, *LAST)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return a column as an array; of a figure NaN, of a text None, where a run has none. Raises UnknownName."""
+        if name not in self.columns:
+            raise UnknownName("no column of the table", name, self.columns)
+        values = [row.get(name) for row in self.rows]
+        kind = object if name in (*self.parameters, *TEXTS) else int if name == SEED else float
+        return np.array(values, kind)
+
+    def to_pandas(self) -> Any:
+        """Return a data frame of pandas, which is installed apart from foosim."""
+        frame: Any = import_module("pandas").DataFrame(self.rows, columns=list(self.columns))
+        return frame
 
     def key(self, row: Mapping[str, Any]) -> tuple[Any, ...]:
         """Return the values and the seed of a row's run."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,7 +11,8 @@ import pytest
 
 from foosim.capture.reader import open_capture
 from foosim.cli.match import command as match
-from foosim.simulation.match.game import Fixture, Game, Played
+from foosim.simulation.match.game import Game
+from foosim.simulation.study.run import Ran, Run
 from tests.conftest import Command, Typed
 
 TABLE: Final = Path(__file__).parents[2] / "deploy" / "table.yaml"
@@ -113,12 +114,14 @@ def test_a_player_that_raises_ends_the_match_with_its_place(
 def test_an_interrupted_match_shows_what_has_been_played(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     """The third game is interrupted, as by Ctrl-C."""
 
-    def games(fixture: Fixture, game: Game) -> Played:
-        if game.seed == 3:
-            raise KeyboardInterrupt
-        return Played(game.seed, game.is_swapped, (2, 1), 0, fixture.ticks, "")
+    def outcomes(runs: Mapping[Game, Run], *_: Any) -> Iterator[tuple[Game, Ran]]:
+        for number, game in enumerate(runs):
+            if number == 2:
+                raise KeyboardInterrupt
+            red, blue = (1, 2) if game.is_swapped else (2, 1)
+            yield game, Ran({"score.red": red, "score.blue": blue, "ticks": 5, "digest": "", "marks.out": 0}, "")
 
-    monkeypatch.setattr(match, "play", games)
+    monkeypatch.setattr(match, "outcomes", outcomes)
     done = command("team", "passive", "--games", "9", *SHORT)
     assert done.code == 130
     assert "interrupted after 2 of 9 games" in done.err

@@ -11,7 +11,9 @@ import pytest
 
 from foosim.library.table.players import OF_THE_TABLE
 from foosim.simulation.match.figures import chance
-from foosim.simulation.match.game import Fixture, Game, Played, play
+from foosim.simulation.match.game import Fixture, Game, Played, run_of
+from foosim.simulation.match.game import played as result_of
+from foosim.simulation.study.run import ran
 from tests.deployed import DEPLOYMENT, TABLE, TEXT
 
 MINUTE_TICKS: Final = 60_000_000_000 // DEPLOYMENT.tick_ns
@@ -24,7 +26,8 @@ CHANCE_MIN: Final = 0.01
 
 def played(a: str, b: str, seed: int, minutes: float, *, is_swapped: bool = False) -> Played:
     fixture = Fixture(TEXT, TABLE.name, TABLE.parent, (OF_THE_TABLE[a], OF_THE_TABLE[b]), round(minutes * MINUTE_TICKS))
-    game = play(fixture, Game(seed, is_swapped))
+    chosen = Game(seed, is_swapped)
+    game = result_of(fixture, chosen, ran(run_of(fixture, chosen)))
     assert not game.failed, game.failed
     return game
 

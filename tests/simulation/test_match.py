@@ -10,7 +10,8 @@ import yaml
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.library.table.players import OF_THE_TABLE
 from foosim.simulation.match.figures import chance, draw, figures
-from foosim.simulation.match.game import Fixture, Game, Link, Played, play, points_of, sets_of
+from foosim.simulation.match.game import Fixture, Game, Link, Played, played, points_of, run_of, sets_of
+from foosim.simulation.study.run import ran
 
 TABLE = Path(__file__).parents[2] / "deploy" / "table.yaml"
 CLASSES = OF_THE_TABLE["team"], OF_THE_TABLE["passive"]
@@ -20,6 +21,10 @@ SECOND_TICKS = 500
 def fixture(*, ticks: int = SECOND_TICKS, worse: tuple[int, ...] = (0,), sets: tuple[str, ...] = ()) -> Fixture:
     text = apply_sets(TABLE.read_text(), TABLE.name, ["engine=pure", *sets])
     return Fixture(text, TABLE.name, TABLE.parent, CLASSES, ticks, worse)
+
+
+def play(chosen: Fixture, game: Game) -> Played:
+    return played(chosen, game, ran(run_of(chosen, game)))
 
 
 def test_chance_is_two_sided_and_leaves_equals_alone() -> None:

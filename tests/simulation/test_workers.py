@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-from contextlib import closing
 from math import sqrt
 from pathlib import Path
 from time import sleep
 
-import pytest
-
-from foosim.common.errors import Failed
-from foosim.simulation.workers import Lost, apart, executor_here, in_processes
+from foosim.simulation.workers import Lost, apart, executor_here
 
 
 def children() -> set[int]:
@@ -21,14 +17,18 @@ def children() -> set[int]:
     return {int(pid) for task in tasks for pid in (task / "children").read_text().split()}
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_results_come_in_order_errors_come_out_and_nobody_is_left(jobs: int) -> None:
+def test_results_and_errors_come_out_and_the_child_is_used_again() -> None:
     before = children()
-    with closing(in_processes(sqrt, [9.0, 4.0, 1.0, -1.0], jobs, "the test")) as results:
-        assert [next(results) for _ in range(3)] == [3.0, 2.0, 1.0]
-        with pytest.raises(ValueError, match="math domain error"):
-            next(results)
+    with executor_here(1) as pool:
+        first, second = pool.submit(apart, getpid, None), pool.submit(apart, getpid, None)
+        bad = pool.submit(apart, sqrt, -1.0).exception()
+        assert first.result() == second.result() != os.getpid()
+        assert isinstance(bad, ValueError) and "in serve" in bad.__notes__[0]
     assert children() == before
+
+
+def getpid(_: None) -> int:
+    return os.getpid()
 
 
 def test_a_child_that_dies_or_hangs_costs_its_work_only() -> None:
@@ -44,12 +44,10 @@ def test_a_child_that_dies_or_hangs_costs_its_work_only() -> None:
     assert children() == before
 
 
-def test_the_end_of_a_pool_ends_work_and_a_killed_process_of_many_is_named() -> None:
+def test_the_end_of_a_pool_ends_work_that_runs() -> None:
     before = children()
-    results = in_processes(sleep, [0.0, *[600.0] * 8], 2, "the test")
-    next(results)
-    results.close()
+    with executor_here(2) as pool:
+        futures = [pool.submit(apart, sleep, time_s) for time_s in (0.0, *[600.0] * 8)]
+        futures[0].result()
     assert children() == before
-    with pytest.raises(Failed, match="a process of the test was killed; fewer than --jobs 2 need less memory"):
-        list(in_processes(os._exit, [3, 3], 2, "the test"))
-    assert children() == before
+    assert all(isinstance(future.exception(), Lost) for future in futures[1:] if not future.cancelled())

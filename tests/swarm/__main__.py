@@ -26,7 +26,7 @@ from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.text.files import read_source_file
 from foosim.simulation.attendant import LINE_S
-from foosim.simulation.workers import in_processes
+from foosim.simulation.workers import apart, executor_here
 from tests.swarm.campaign import Files, Flown, fly
 from tests.swarm.faults import TICKS
 
@@ -36,10 +36,15 @@ def fly_seeds(
 ) -> Generator[Flown, None, None]:
     """Fly the seeds in `jobs` processes, and yield their results in the order of the seeds.
 
-    One job is this process. The processes end with the iterator, also amid a seed. Raises Failed when one of them
-    was killed.
+    One job is this process. The processes end with the iterator, also amid a seed. Raises Lost when one of them was
+    killed.
     """
-    return in_processes(partial(fly, text, name, ticks=ticks, files=files), seeds, jobs, "the swarm")
+    work = partial(fly, text, name, ticks=ticks, files=files)
+    if jobs == 1:
+        yield from map(work, seeds)
+        return
+    with executor_here(jobs) as pool:
+        yield from (done.result() for done in [pool.submit(apart, work, seed) for seed in seeds])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
