@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from hashlib import blake2b
 from importlib.util import find_spec
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any, Final
 
@@ -107,9 +108,9 @@ def study_of(
             raise BadValue(f"{what}: {'a value is there twice' if listed else 'there is no value'}", ",".join(listed))
     if SEED in values:
         raise BadValue("the seed is no parameter: it has its own option", SEED)
+    if (runs := prod(map(len, values.values())) * len(seeds)) > RUNS_MAX:
+        raise BadValue(f"more than {RUNS_MAX} runs", runs)
     study = Study(text, str(file), file.parent.absolute(), ticks, values, tuple(seeds))
-    if len(study.combinations) * len(seeds) > RUNS_MAX:
-        raise BadValue(f"more than {RUNS_MAX} runs", len(study.combinations) * len(seeds))
     _check_parameters(study)
     return study
 
@@ -145,7 +146,7 @@ def read_study(file: Path) -> StudyFile | None:
     try:
         return msgspec.convert(content, StudyFile)
     except msgspec.ValidationError as error:
-        raise BadValue(f"{file}: {error}") from None
+        raise BadValue(f"{file}: {error} (the keys are deployment, for, vary, seeds and set)") from None
 
 
 def text_of(value: object) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, as_completed
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,11 +29,11 @@ LIMIT_S: Final = 3600.0
 
 @dataclass(slots=True)
 class Progress:
-    """How far a sweep is: runs of the study, of these ended, failed, and their wall time in all."""
+    """How far a sweep is: runs of the study, those that the results had before, those that ended since `begun_s`, all
+    failed ones of the results, and the wall time of the ended ones in all."""
 
     runs: int
     known: int
-    """Rows that the results had before."""
     begun_s: float
     ended: int = 0
     failed: int = 0
@@ -118,7 +118,8 @@ def sweep(
     and after Ctrl-C.
     """
     results = Results(study, out)
-    so_far = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic())
+    failed = sum(bool(row["message"]) for row in results.table.rows)
+    so_far = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic(), failed=failed)
     progress(so_far)
     try:
         with closing(outcomes(results.missing, executor, limit_s)) as found:
@@ -139,7 +140,7 @@ def outcomes(runs: Mapping[Key, Run], executor: Executor, limit_s: float) -> Gen
         for key, run in runs.items():
             keys[executor.submit(apart, ran, run, limit_s)] = key
         for done in as_completed(keys):
-            yield keys[done], _outcome(done)
+            yield keys.pop(done), _outcome(done)  # Dask would compute a result that is kept again, if its worker died
     finally:
         for future in keys:
             future.cancel()
@@ -151,7 +152,9 @@ def _outcome(done: Future[Ran]) -> Ran:
         return done.result()
     except (OtherVersion, BrokenExecutor):
         raise
-    except ImportError as error:
+    except CancelledError:  # by its executor: the sweep cancels what it no longer waits for
+        raise BrokenExecutor("runs were cancelled, as by a scheduler that has ended") from None
+    except (ImportError, AttributeError) as error:
         raise OtherVersion(f"a worker lacks foosim or a part of it: {error}") from error
     except Exception as error:  # noqa: BLE001  # of any executor: a process was killed, a worker lost
         return Ran({}, str(error) or type(error).__name__)

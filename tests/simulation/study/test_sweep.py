@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, Executor, Future
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+from weakref import ref
 
 import numpy as np
 import pytest
 
 import foosim
 from foosim.common.errors import BadValue, DeploymentError, Refused
+from foosim.simulation.study.run import OtherVersion, Ran
 from foosim.simulation.study.study import Study, seeds_of, study_of, text_of, values_of
 from foosim.simulation.study.sweep import Progress, sweep
 from foosim.simulation.study.table import Table, read_table, write_table
@@ -115,6 +118,37 @@ def test_a_run_that_fails_costs_its_row(tmp_path: Path, executor: Executor) -> N
     assert rows[-1]["players.player-red.tick"] >= 40.0 and rows[-1]["players.player-red.shots"] == 1.5
     table = read_table(tmp_path / "results.csv")
     assert table.rows == rows and np.isnan(table["players.player-red.tick"]).tolist() == [True] * 4 + [False]
+
+
+class Ends(Executor):
+    """Gives each run at once; the last one is cancelled, as by a Dask client whose scheduler has ended."""
+
+    def __init__(self, runs: int) -> None:
+        self.futures: list[ref[Future[Ran]]] = []
+        self.runs = runs
+
+    def submit(self, *_: object, **__: object) -> Any:
+        future: Future[Ran] = Future()
+        self.futures.append(ref(future))
+        if len(self.futures) < self.runs:
+            future.set_result(Ran({}, ""))
+        else:
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        return future
+
+
+def test_an_executor_that_ends_or_has_another_version_makes_no_row(tmp_path: Path, executor: Executor) -> None:
+    """And a result that has been taken is not kept: Dask would compute it again if its worker died."""
+    ends, kept = Ends(5), list[int]()
+    sweep(study({}, range(4)), ends, progress=lambda _: kept.append(sum(one() is not None for one in ends.futures)))
+    assert kept == [0, 4, 3, 2, 1], "all, but for those that have been taken before the last one"
+    with pytest.raises(BrokenExecutor, match="were cancelled"):
+        sweep(study({}, [5]), ends, tmp_path / "results.csv")
+    older = replace(study({}, range(5)), version="0.0.1")
+    with pytest.raises(OtherVersion, match=r"the study has 0\.0\.1"):
+        sweep(older, executor, tmp_path / "results.csv")
+    assert not [*tmp_path.iterdir()]
 
 
 def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why(executor: Executor) -> None:
