@@ -14,7 +14,7 @@ from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
 from foosim.capture.parts import files_from
 from foosim.capture.reader import DECODERS, TICK_MARKS, FrameReader, Scan, TickMark, chain_at_start, deployment_of
-from foosim.capture.rows import CLIENTS, EPOCHS, PACKETS, RECOVERIES, TICK, Fate
+from foosim.capture.rows import CLIENTS, EPOCHS, METRICS, PACKETS, RECOVERIES, TICK, Fate
 from foosim.common import struct_types
 from foosim.deployment.schema import Deployment
 from foosim.world.assembly.world import count_commands
@@ -59,6 +59,8 @@ class CaptureInfo:
     recoveries: int
     files: Mapping[str, int]
     topics: Mapping[str, int]
+    metrics: Mapping[str, float]
+    """The last value of each metric."""
 
 
 class PacketMark(msgspec.Struct, frozen=True, gc=False):
@@ -110,6 +112,7 @@ def capture_info(path: Path | str) -> CaptureInfo:
         found.topics[RECOVERIES],
         {name: len(content) for name, content in sorted(about.files.items())},
         dict(sorted(found.topics.items())),
+        dict(sorted(found.metrics.items())),
     )
 
 
@@ -134,6 +137,7 @@ class _Counts:
         self.nodes: set[str] = set()
         self.arithmetic: set[str] = set()
         self.clients: set[str] = set()
+        self.metrics: dict[str, float] = {}
         self._last: dict[str, Message] = {}
         """The layout, then the last frame."""
         self._scan = scan
@@ -154,6 +158,9 @@ class _Counts:
             self._take_tick(decode(TICK_MARKS, message))
         elif topic == CLIENTS:
             self.clients.add(decode(DECODERS[CLIENTS], message).client)
+        elif topic == METRICS:
+            metric = decode(DECODERS[METRICS], message)
+            self.metrics[metric.name] = metric.value
         elif topic == EPOCHS:
             epoch = decode(DECODERS[EPOCHS], message)
             self.nodes.update(epoch.roster)

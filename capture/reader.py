@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from foosim.capture.columns import (
     Frames,
     Integers,
+    Numbers,
     Packets,
     Poses,
     frame_of,
@@ -50,6 +51,7 @@ from foosim.capture.rows import (
     FORMAT,
     FRAME,
     LAYOUT,
+    METRICS,
     PACKETS,
     PROFILE,
     RECOVERIES,
@@ -61,6 +63,7 @@ from foosim.capture.rows import (
     EpochRow,
     FrameRow,
     LayoutRow,
+    MetricRow,
     PacketRow,
     RecoveryRow,
     Row,
@@ -279,6 +282,16 @@ class CaptureData:
             raise CaptureError(f"{self.path}: no rows of {topic!r}, there are {', '.join(sorted(ROW_TYPES))}")
         for _, row in Scan(self.path).rows(frozenset({topic})):
             yield row
+
+    def metrics(self) -> dict[str, tuple[Integers, Numbers]]:
+        """Return the ticks of each metric and its values from their closings on, by name (`MetricRow`)."""
+        found: dict[str, tuple[array[int], array[float]]] = {}
+        for row in self.rows(METRICS):
+            assert isinstance(row, MetricRow)
+            ticks, values = found.setdefault(row.name, (array("q"), array("d")))
+            ticks.append(row.tick)
+            values.append(row.value)
+        return {name: (np.array(ticks), np.array(values)) for name, (ticks, values) in sorted(found.items())}
 
     def captured_ticks(self) -> Iterator[CapturedTick]:
         """Yield the inputs of a re-simulation, tick by tick."""

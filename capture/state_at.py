@@ -1,4 +1,4 @@
-"""The state of a capture at a tick: epoch, layout, scene and clients, each as its last message.
+"""The state of a capture at a tick: epoch, layout, scene, clients and metrics, each as its last message.
 
 A file that begins within a run repeats these messages, so that it can be read by itself.
 """
@@ -6,19 +6,22 @@ A file that begins within a run repeats these messages, so that it can be read b
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
 from foosim.capture.foxglove import SCENE
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.mcap.format import Message
-from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, ClientRow
+from foosim.capture.rows import CLIENTS, EPOCHS, LAYOUT, METRICS, ClientRow, MetricRow
 
 _ONE: Final = (EPOCHS, LAYOUT, SCENE)
 """Of these the last message is in force."""
-HOLDING: Final = frozenset({*_ONE, CLIENTS})
-_decoder: Final = msgspec.json.Decoder(ClientRow)
+HOLDING: Final = frozenset({*_ONE, CLIENTS, METRICS})
+_decoders: Final[dict[str, msgspec.json.Decoder[Any]]] = {
+    CLIENTS: msgspec.json.Decoder(ClientRow),
+    METRICS: msgspec.json.Decoder(MetricRow),
+}
 
 
 class ActiveState:
@@ -29,24 +32,31 @@ class ActiveState:
         self._last: dict[str, Message] = {}
         self._clients: dict[str, Message] = {}
         """The join of each present client, in the order of joining."""
+        self._metrics: dict[str, Message] = {}
+        """By name."""
 
     def take(self, message: Message) -> None:
         """Take the next message. Raises CaptureError for a damaged one."""
-        if message.topic == CLIENTS:
-            try:
-                row = _decoder.decode(message.data)
-            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-                raise CaptureError(f"{self._name}: {message.topic} at {message.log_ns} ns: {error}") from None
+        if message.topic in _ONE:
+            self._last[message.topic] = message
+            return
+        if message.topic not in _decoders:
+            return
+        try:
+            row: ClientRow | MetricRow = _decoders[message.topic].decode(message.data)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise CaptureError(f"{self._name}: {message.topic} at {message.log_ns} ns: {error}") from None
+        if isinstance(row, MetricRow):
+            self._metrics[row.name] = message
+        else:
             self._clients.pop(row.client, None)
             if row.event == "joins":
                 self._clients[row.client] = message
-        elif message.topic in _ONE:
-            self._last[message.topic] = message
 
     def copy(self) -> ActiveState:
         """Return a copy."""
         copied = ActiveState(self._name)
-        copied._last, copied._clients = dict(self._last), dict(self._clients)
+        copied._last, copied._clients, copied._metrics = dict(self._last), dict(self._clients), dict(self._metrics)
         return copied
 
     def messages(self) -> Iterator[Message]:
@@ -55,5 +65,6 @@ class ActiveState:
             if topic in self._last:
                 yield self._last[topic]
         yield from self._clients.values()
+        yield from self._metrics.values()
         if SCENE in self._last:
             yield self._last[SCENE]

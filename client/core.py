@@ -123,7 +123,7 @@ class ClientCore:
         """The last value of each metric that the client has reported; in lockstep, what the next answer has."""
         self._done, self._done_number = b"", -1
         self._downlinks = self._repeated = self._missing = self._malformed = self._overflowed = 0
-        self._received = self._sent = self._answered = self._unsent = self._returns = 0
+        self._received = self._sent = self._answered = self._unsent = self._returns = self._reports = 0
         self._readers: dict[type[Any], Callable[[Any], None]] = {
             ClientWelcome: self._on_welcome,
             ClientRefusal: self._on_refusal,
@@ -291,7 +291,11 @@ class ClientCore:
         if self._period:
             self._changed |= changed
         elif not self.is_away:
-            self._publish(encode(Up(self.name, self.boot, [], [*changed.items()])))
+            self._publish_metrics(changed)
+
+    def _publish_metrics(self, metrics: Mapping[str, float]) -> None:
+        self._reports += 1
+        self._publish(encode(Up(self.name, self.boot, [], [*metrics.items()], self._reports)))
 
     def fail(self, reason: str, trace: str = "") -> None:
         """Report that this client's own code has failed, and why, before its process ends; `trace` goes to the log."""
@@ -338,7 +342,7 @@ class ClientCore:
         if self._period:  # it may not have recorded what was reported before
             self._changed = dict(self._metrics)
         elif self._metrics:
-            self._publish(encode(Up(self.name, self.boot, [], [*self._metrics.items()])))
+            self._publish_metrics(self._metrics)
         self.actions.append(Log("info", "the vHub is back"))
 
     def _on_refusal(self, refusal: ClientRefusal) -> None:

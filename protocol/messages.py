@@ -394,12 +394,16 @@ Metrics = Annotated[list[tuple[Name, float]], Meta(max_length=limits.METRICS_MAX
 
 
 class Up(Message, frozen=True):
-    """Packets of a free-running client, numbered without gaps; the vHub accepts none after a gap."""
+    """Packets of a free-running client, numbered without gaps; the vHub accepts none after a gap.
+
+    Or the metrics of its report of this number, which is above those of its earlier ones.
+    """
 
     name: Name
     boot: Name
     packets: Packets
     metrics: Metrics = field(default_factory=list)
+    report: Counter = 0
 
 
 class Done(Message, frozen=True):

@@ -27,7 +27,7 @@ from foosim.simulation.carriers import Bypass, Carrier, EmulatedNetwork
 from foosim.simulation.stepped_world import SteppedWorld
 from foosim.vhub.network.memory import Joining
 from foosim.world.assembly.initial_state import first_frame
-from foosim.world.assembly.world import build_scene, world_status
+from foosim.world.assembly.world import build_scene, status_numbers, world_status
 from foosim.world.edits import Disrupt, Edit, Remove, written
 from foosim.world.frame import Frame
 from foosim.world.scene import Scene
@@ -171,6 +171,20 @@ class Simulation(Closable):
     def status(self) -> dict[str, Any]:
         """What rules and kits show, as in the result of a run: of the table `score`."""
         return world_status(self.deployment, self.frame)
+
+    @property
+    def metrics(self) -> dict[str, float | None]:
+        """The metrics so far, named as in the result of a run: numbers of `status`, what players report that act by
+        themselves, and figures of the network where there is one. None stands for infinity and NaN."""
+        residents = sorted(self._residents.items())
+        reported = {
+            f"players.{name}.{metric}": value
+            for name, resident in residents
+            for metric, value in sorted(resident.acting.metrics.items())
+        }
+        carrier = self._carrier
+        network = carrier.state.metrics.values() if isinstance(carrier, EmulatedNetwork) else {}
+        return {**status_numbers(self.status), **reported, **network}
 
     @property
     def readings(self) -> dict[Pair, Sample]:

@@ -188,7 +188,9 @@ class Clients:
         if self._sessions.is_in_doubt(session, self._state.deployment):
             self.repeated += 1
             return
-        self._take_metrics(up)
+        if up.report > session.report:
+            self._take_metrics(up)
+            session.report = up.report
         if not self._sessions.admits(session, len(up.packets), len(payload)):
             self._state.reject_on_receipt("inbox_full", len(up.packets))
             return

@@ -127,6 +127,8 @@ class Session:
     fetched_bytes: int = 0
     """What it has fetched, less what it may fetch since."""
     fetched_ns: int = 0
+    report: int = 0
+    """The number of its newest report outside of lockstep."""
     inbox: list[Sent] = field(default_factory=list)
     inbox_bytes: int = 0
     """Size of the messages as received."""
@@ -151,7 +153,7 @@ class Session:
             if self.boot and self.is_gone:
                 _remember(self.before, self.boot, None)
                 self.claims.pop(self.boot, None)
-            self.inbox, self.inbox_bytes, self.next_sequence = [], 0, 1
+            self.inbox, self.inbox_bytes, self.next_sequence, self.report = [], 0, 1, 0
         self.is_present = self.is_present and boot == self.boot
         self.boot, self.received, self.is_behind, self.is_gone = boot, received, True, False
         self.why_gone = CLOSED

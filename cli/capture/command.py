@@ -21,6 +21,7 @@ from foosim.cli.capture.report import report
 from foosim.cli.capture.what_if import what_if
 from foosim.common import limits
 from foosim.common.errors import BadValue, Failed
+from foosim.protocol.run_status import reported_text
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.runtime.journal import JournalError
 from foosim.simulation.verify import Verified, verify_capture
@@ -73,6 +74,7 @@ def _describe(found: CaptureInfo) -> str:
         *([f"  {_commands(found.commands)}"] if found.commands else []),
         *([f"  on channels {_counted(found.channels)}"] if found.channels else []),
         f"  payloads {found.payload_bytes / 1e6:.1f} MB",
+        *(f"  {line}" for line in reported_text(found.metrics)),
         f"  recoveries {found.recoveries}",
         "  topics",
         *(f"    {topic}: {count}" for topic, count in found.topics.items()),

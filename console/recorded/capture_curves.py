@@ -16,7 +16,7 @@ from foosim.console.recorded.recording import Look, Recording
 from foosim.console.shown.curves import link_figure, value_at
 from foosim.console.shown.source import Curve
 from foosim.deployment.channel_kinds import channel_codec
-from foosim.world.assembly.world import world_status, world_texts
+from foosim.world.assembly.world import status_numbers, world_status, world_texts
 from foosim.world.component_types.payloads import PayloadCodec
 
 
@@ -43,6 +43,7 @@ def status_at(recording: Recording, account: Mapping[str, Any], tick: int, look:
         "shown": None if look is None else {"kind": look.kind, "tick": look.tick},
         "digest": {"frame": frame.digest.hex()} if frame is not None and frame.tick == tick else None,
         **shown,
+        "metrics": {**status_numbers(shown), **recording.metrics_at(tick)},
         "summary": [] if frame is None else world_texts(deployment, shown),
         "nodes": {node: {"owned": sorted(robot for robot in owners if owners[robot] == node)} for node in roster},
         "recoveries": [
@@ -112,6 +113,9 @@ def _status(history: CaptureHistory, curve: Curve, tick: int) -> float | None:
     recording = history.recording
     if curve.status.startswith("packets."):
         return value_at({"packets": history.links.totals(tick * recording.tick_ns)}, curve.status)
+    kind, _, metric = curve.status.partition(".")
+    if kind == "metrics" and (value := recording.metric_at(metric, tick)) is not None:
+        return value
     return value_at(status_at(recording, {}, tick, recording.look(tick)), curve.status)
 
 

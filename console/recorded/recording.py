@@ -6,6 +6,8 @@ captured last before it holds. `Look.kind` is which.
 
 from __future__ import annotations
 
+from array import array
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isnan
@@ -32,13 +34,13 @@ from foosim.capture.reader import (
     read_about,
     row_of,
 )
-from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
+from foosim.capture.rows import EPOCHS, FRAME, LAYOUT, METRICS, RECOVERIES, TICK, EpochRow, FrameRow, RecoveryRow
 from foosim.console.shown.drawing import Drawing
 from foosim.console.shown.tracks import GAP_NS, Pose, between, is_jump
 from foosim.deployment.schema import Deployment
 from foosim.world.frame import Frame
 
-TOPICS: Final = (EPOCHS, FRAME, LAYOUT, RECOVERIES, TICK, POSES)
+TOPICS: Final = (EPOCHS, FRAME, LAYOUT, METRICS, RECOVERIES, TICK, POSES)
 Kind = Literal["frame", "poses", "computed", "held"]
 """What is seen at a tick: its captured frame, its captured poses, its frame computed again from the captured inputs and
 equal in its digest, or the last captured one before it."""
@@ -71,6 +73,8 @@ class Recording:
         """Whether the capture has named its layout, which is that of the deployment."""
         self.epochs: list[EpochRow] = []
         self.recoveries: list[RecoveryRow] = []
+        self._metrics: dict[str, tuple[array[int], array[float]]] = {}
+        self._metrics_read = 0
         self._generation = self.index.generation
         self._take()
 
@@ -92,6 +96,7 @@ class Recording:
             self._generation = self.index.generation
             self._is_checked = False
             self.epochs, self.recoveries = [], []
+            self._metrics, self._metrics_read = {}, 0
         self._take()
         return True
 
@@ -110,6 +115,30 @@ class Recording:
     def decoded(self, decoder: msgspec.json.Decoder[Any], message: Message) -> Any:
         """Return a message decoded. Raises CaptureError."""
         return row_of(decoder, message, f"{self.path}: ")
+
+    def metrics_at(self, tick: int) -> dict[str, float]:
+        """Return the metrics in rows up to a tick, by name. Raises CaptureError."""
+        self._read_metrics()
+        found = ((name, self.metric_at(name, tick)) for name in sorted(self._metrics))
+        return {name: value for name, value in found if value is not None}
+
+    def metric_at(self, name: str, tick: int) -> float | None:
+        """Return a metric by the rows up to a tick; None without one. Raises CaptureError."""
+        self._read_metrics()
+        if name not in self._metrics:
+            return None
+        ticks, values = self._metrics[name]
+        number = bisect_right(ticks, tick)
+        return values[number - 1] if number else None
+
+    def _read_metrics(self) -> None:
+        """Read the rows of metrics that were written since the last call."""
+        for number in range(self._metrics_read, len(self.index.places[METRICS])):
+            row = self.row(METRICS, number)
+            ticks, values = self._metrics.setdefault(row.name, (array("q"), array("d")))
+            ticks.append(row.tick)
+            values.append(row.value)
+            self._metrics_read = number + 1
 
     # --- the world at a tick -----------------------------------------------------------------------------------------
 

@@ -48,14 +48,20 @@ def _points(curve: Curve, message: Mapping[str, Any]) -> list[tuple[float, float
 
 
 def value_at(content: Any, path: str) -> float | None:
-    """Return the number at a path of keys joined by dots; None for an unknown path."""
-    for key in path.split("."):
-        if isinstance(content, Mapping):
-            content = content.get(key)
-        elif isinstance(content, list) and key.isdecimal() and len(key) < 6:
-            content = content[int(key)] if int(key) < len(content) else None
-        else:
-            return None
+    """Return the number at a path of keys joined by dots; None for an unknown path.
+
+    The last key may have dots itself, as names of metrics have.
+    """
+    key, _, rest = path.partition(".")
+    if isinstance(content, Mapping):
+        key, rest = (path, "") if path in content else (key, rest)
+        content = content.get(key)
+    elif isinstance(content, list) and key.isdecimal() and len(key) < 6:
+        content = content[int(key)] if int(key) < len(content) else None
+    else:
+        return None
+    if rest:
+        return value_at(content, rest)
     return float(content) if isinstance(content, int | float) else None
 
 

@@ -122,8 +122,10 @@ class Weather:
     def act(self) -> None:
         ear, hand = self.clients["ear"], self.clients["hand"]
         if ear.statistics().downlinks:
+            ear.report({"tick": float(self.air.tick), "constant": 1.0})
             ear.send(packets_of(self.air.tick))
         if hand.go is not None:
+            hand.report({"tick": float(hand.go.tick)})
             hand.done([Packet("red.goal", "echo", b"%d" % hand.go.tick)])
 
     def die(self) -> None:
@@ -183,6 +185,7 @@ def test_each_process_that_lives_gets_in_and_everything_arrives_once_both_ways(s
     assert sorted(numbers) == [*range(1, len(numbers) + 1)] and len(numbers) >= ear._sequence - 4
     ticks = [int(packet.payload) for packet in delivered if packet.source == "hand"]
     assert ticks == [*range(ticks[0], ticks[-1] + 1)] and ticks[-1] == state.closed, "an answer for each tick"
+    assert state.metrics.reported == {"ear": ear._metrics, "hand": hand._metrics}, "the last values, not late ones"
 
 
 def test_hello_is_said_often_while_the_vhub_is_gone_and_at_once_when_it_is_there() -> None:

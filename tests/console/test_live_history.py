@@ -10,6 +10,7 @@ import pytest
 
 from foosim.console.live import history as kept
 from foosim.console.live.history import APART_NS, History, Rows
+from foosim.console.shown.curves import points_of
 from foosim.console.shown.source import Curve, Wanted
 from tests.console.test_following import commit, following, frame_of, status
 
@@ -37,11 +38,15 @@ def test_values_of_the_status_figures_of_links_and_readings_are_kept() -> None:
     link = ["a", "b", 4, 3, 1, 2_000_000, "everything", 5_000_000, {"loss": 1}]
     for number in range(1, 5):
         said: dict[str, Any] = status("running") | {"ticks": number * WIDE, "lag_ms": {"p99": number / 2}}
+        said |= {"metrics": {"players.a.trips": number}}
         readings = [[number * WIDE, [0.5, float(number)]], [number * WIDE + 1, [0.5, 9.0]]]
         said |= {"links": [link], "watched": {"readings": {"camera/ball": readings}}, "rtf": None}
         found.take_status(said)
     ticks = [number * WIDE for number in range(1, 5)]
     assert found.points(Curve("l", status="lag_ms.p99"))() == [(tick, tick / WIDE / 2) for tick in ticks]
+    assert found.points(Curve("t", status="metrics.players.a.trips"))() == [(tick, tick / WIDE) for tick in ticks]
+    (line,) = points_of([Curve("t", status="metrics.players.a.trips")], {"type": "status", "status": said})
+    assert line["points"] == [(ticks[-1], 4.0)]
     assert found.points(Curve("x", reading=("camera", "ball"), index=1))() == [(tick, tick / WIDE) for tick in ticks]
     assert found.points(Curve("q", link=("a", "b"), figure="queue_ms"))() == [(ticks[0], 5.0), (ticks[2], 5.0)]
     for curve in (
