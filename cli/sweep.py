@@ -95,15 +95,21 @@ def _study(options: SweepOptions) -> Study:
     """Return the study of the options, which go before those of a study file. Raises Refused."""
     known, file, sets = read_study(options.file), options.file, options.sets
     vary: dict[str, list[object]] = {}
-    duration, seeds = options.duration, options.seeds or "1"
+    duration, seeds = options.duration, "1"
     if known is not None:
         file, sets, vary = file.parent / known.deployment, (*known.sets, *sets), {**known.vary}
-        duration, seeds = duration or known.duration, options.seeds or str(known.seeds)
+        duration, seeds = duration or known.duration, str(known.seeds)
     if duration is None:
         raise BadValue("--for is missing: the simulated time of each run, e.g. --for 60s")
+    if options.seeds is not None:
+        seeds = options.seeds
+    given: set[str] = set()
     for one in options.vary:
         path, equals, values = one.partition("=")
         if not equals:
             raise BadValue("--vary: not of the form PATH=VALUE,VALUE", one)
+        if path in given:
+            raise BadValue("--vary: the parameter is there twice", path)
+        given.add(path)
         vary[path] = [*read_at(f"--vary: {path}", values_of, values)]
     return study_of(file, duration, vary, read_at("--seeds", seeds_of, seeds), sets)

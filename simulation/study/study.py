@@ -106,7 +106,7 @@ def study_of(
     for what, listed in (*values.items(), ("seeds", tuple(map(str, seeds)))):
         if not listed or len(set(listed)) != len(listed):
             raise BadValue(f"{what}: {'a value is there twice' if listed else 'there is no value'}", ",".join(listed))
-    if SEED in values:
+    if SEED in values or any(one.partition("=")[0] == SEED for one in sets):
         raise BadValue("the seed is no parameter: it has its own option", SEED)
     if (runs := prod(map(len, values.values())) * len(seeds)) > RUNS_MAX:
         raise BadValue(f"more than {RUNS_MAX} runs", runs)

@@ -175,6 +175,11 @@ def test_a_study_that_cannot_be_run_is_refused(
     assert problem in str(refused.value)
 
 
+def test_a_seed_among_the_sets_is_refused() -> None:
+    with pytest.raises(BadValue, match="the seed is no parameter"):
+        study({}, [1], "seed=2")
+
+
 def test_results_of_another_study_version_or_place_are_refused_before_anything_runs(
     tmp_path: Path, whole: Table, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,6 +201,10 @@ def test_results_of_another_study_version_or_place_are_refused_before_anything_r
     assert "ends with .csv, .jsonl, .parquet" in refused(study(VARY), tmp_path / "results.txt")
     out.write_text("a,b\n1,2\n")
     assert "not a results file of a sweep" in refused(study(VARY))
+    cut, twice = before.rpartition(b",")[0], before + before.splitlines(keepends=True)[1]
+    for damaged, problem in (cut, "row 8: foosim is no text"), (twice, "row 9: an earlier row has its parameters"):
+        out.write_bytes(damaged)
+        assert problem in refused(study(VARY, [1, 2]))
 
 
 def test_values_are_texts_of_set_and_ranges_are_whole_numbers() -> None:
