@@ -16,6 +16,7 @@ from foosim.deployment.loader import apply_sets, load_deployment
 from foosim.deployment.schema import Deployment
 from foosim.library.table.players import OF_THE_TABLE
 from foosim.simulation.study.run import Ran, Run, version_here
+from foosim.simulation.study.table import LAST
 from foosim.world.assembly.initial_state import initial_frame
 from foosim.world.assembly.world import mark_kinds, world_status
 
@@ -131,6 +132,7 @@ class Played:
     digest: str
     failed: str = ""
     link: Link | None = field(default=None)
+    metrics: Mapping[str, float] = field(default_factory=dict)
 
 
 def run_of(fixture: Fixture, game: Game) -> Run:
@@ -147,8 +149,9 @@ def played(fixture: Fixture, game: Game, found: Ran) -> Played:
     score = {side: int(figures[f"{SCORE}.{side}"]) for side in seats(deployment, fixture.name)}
     away = sum(figures[f"marks.{name}"] for name, kind in mark_kinds(deployment).items() if kind.look == AWAY)
     points = points_of(score, is_swapped=game.is_swapped)
-    ticks, digest = figures["ticks"], figures["digest"]
-    return Played(game.seed, game.is_swapped, points, int(away), ticks, digest, link=game.link)
+    metrics = {name: value for name, value in figures.items() if name not in LAST}
+    its = points, int(away), figures["ticks"], figures["digest"]
+    return Played(game.seed, game.is_swapped, *its, link=game.link, metrics=metrics)
 
 
 def points_of(score: Mapping[str, int], *, is_swapped: bool) -> tuple[int, int]:

@@ -56,6 +56,7 @@ def test_worse_networks_have_a_row_each_and_a_picture(command: Command, tmp_path
     ]
     assert found["worse_for"] == "a" and len(found["games"]) == 4
     assert len({game["digest"] for game in found["games"]}) == 4, "each network gives another game"
+    assert [game["metrics"]["network.encoder.loss"] > 0.03 for game in found["games"]] == [False, True] * 2
     assert "loss 10 %" in drawing.read_text()
 
 
