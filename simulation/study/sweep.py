@@ -29,8 +29,8 @@ LIMIT_S: Final = 3600.0
 
 @dataclass(slots=True)
 class Progress:
-    """How far a sweep is: runs of the study, those that the results had before, those that ended since `begun_s`, all
-    failed ones of the results, and the wall time of the ended ones in all."""
+    """How far a sweep is: runs of the study, rows that the results had before, runs that ended since `begun_s` and
+    their wall time in all, failed runs of both."""
 
     runs: int
     known: int
