@@ -77,7 +77,9 @@ class Results:
 
     def _take(self, path: Path, table: Table) -> None:
         if {*table.parameters} != {*self.table.parameters}:
-            raise OtherStudy(f"{path}: its parameters are {', '.join(table.parameters) or 'none'}")
+            raise OtherStudy(
+                f"{path}: results of another study: its parameters are {', '.join(table.parameters) or 'none'}"
+            )
         for number, row in enumerate(table.rows, 1):
             for name, own in self._identity.items():
                 if row[name] != own:
