@@ -95,14 +95,13 @@ def _study(options: SweepOptions) -> Study:
     """Return the study of the options, which go before those of a study file. Raises Refused."""
     known, file, sets = read_study(options.file), options.file, options.sets
     vary: dict[str, list[object]] = {}
-    duration, seeds = options.duration, "1"
+    duration, seeds = options.duration, options.seeds
     if known is not None:
         file, sets, vary = file.parent / known.deployment, (*known.sets, *sets), {**known.vary}
-        duration, seeds = duration or known.duration, str(known.seeds)
+        duration = known.duration if duration is None else duration
+        seeds = str(known.seeds) if seeds is None else seeds
     if duration is None:
         raise BadValue("--for is missing: the simulated time of each run, e.g. --for 60s")
-    if options.seeds is not None:
-        seeds = options.seeds
     given: set[str] = set()
     for one in options.vary:
         path, equals, values = one.partition("=")
@@ -112,4 +111,4 @@ def _study(options: SweepOptions) -> Study:
             raise BadValue("--vary: the parameter is there twice", path)
         given.add(path)
         vary[path] = [*read_at(f"--vary: {path}", values_of, values)]
-    return study_of(file, duration, vary, read_at("--seeds", seeds_of, seeds), sets)
+    return study_of(file, duration, vary, read_at("--seeds", seeds_of, "1" if seeds is None else seeds), sets)

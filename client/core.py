@@ -339,9 +339,7 @@ class ClientCore:
             self._again_after_ns, self._again_ns = AGAIN_NS, self._now_ns + AGAIN_NS
         self._recorded(welcome.sequence)
         self._resend(whole=True)
-        if self._period:  # it may not have recorded what was reported before
-            self._changed = dict(self._metrics)
-        elif self._metrics:
+        if self._metrics and not self._period:  # it may not have recorded them; an answer in lockstep comes again
             self._publish_metrics(self._metrics)
         self.actions.append(Log("info", "the vHub is back"))
 

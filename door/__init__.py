@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from foosim.client.jobs import Jobs
     from foosim.client.player import Commands, Packet, Player, Sample, Samples, Turn
     from foosim.client.replay_listener import hear_replay
+    from foosim.common.errors import Refused
     from foosim.deployment.schema import Deployment
     from foosim.protocol.replay_messages import PlayedPacket, PlayedPoses
     from foosim.simulation.simulation import Simulation
@@ -36,6 +37,7 @@ __all__ = [
     "PlayedPacket",
     "PlayedPoses",
     "Player",
+    "Refused",
     "Sample",
     "Samples",
     "Simulation",
@@ -58,6 +60,7 @@ _MODULES = {
     "foosim.client.jobs": ("Jobs",),
     "foosim.client.player": ("Commands", "Packet", "Player", "Sample", "Samples", "Turn"),
     "foosim.client.replay_listener": ("hear_replay",),
+    "foosim.common.errors": ("Refused",),
     "foosim.deployment.schema": ("Deployment",),
     "foosim.protocol.replay_messages": ("PlayedPacket", "PlayedPoses"),
     "foosim.simulation.simulation": ("Simulation",),

@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from contextlib import nullcontext
 from pathlib import Path
 
+from foosim.common.errors import BadValue
 from foosim.simulation.study.study import study_of
 from foosim.simulation.study.sweep import LIMIT_S, Progress
 from foosim.simulation.study.sweep import sweep as sweep_study
@@ -39,6 +40,9 @@ def sweep(  # noqa: PLR0913  # options of a sweep, by keyword
 
     Raises DeploymentError, AssetError, BadValue for bad values, OtherStudy for a file with results of another study.
     """
+    if executor is not None and jobs is not None:
+        raise BadValue("jobs: the workers are those of the executor", jobs)
     study = study_of(Path(deployment), duration, vary, seeds, sets)
-    with executor_here(jobs or os.cpu_count() or 1) if executor is None else nullcontext(executor) as its:
+    processes = os.cpu_count() or 1 if jobs is None else jobs
+    with executor_here(processes) if executor is None else nullcontext(executor) as its:
         return sweep_study(study, its, None if out is None else Path(out), limit_s, progress)

@@ -14,7 +14,7 @@ import shlex
 import sys
 import tomllib
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -28,6 +28,7 @@ from foosim.launcher.plan import make_plan
 from foosim.launcher.run_options import RunOptions
 from foosim.library.table.rod_position import Command
 from foosim.simulation.run import rehearse
+from foosim.simulation.study.study import read_study, seeds_of, study_of
 from foosim.simulation.system import System
 from foosim.world.component_types.per_field import codec_of
 from foosim.world.component_types.registry import find_component
@@ -184,6 +185,37 @@ def test_the_code_of_learning_runs(
     monkeypatch.chdir(ROOT)
     exec(compile(program, name, "exec"), {"__name__": "__main__"})
     assert len(capsys.readouterr().out.splitlines()) >= 1
+
+
+def test_the_cells_of_the_notebook_run_in_their_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With shorter runs, in one process beside this one."""
+    shorter = {'"1s"': '"200ms"', "ticks=500": "ticks=100", "jobs=2": "jobs=1"}
+    (tmp_path / "deploy").symlink_to(ROOT / "deploy")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    page = ROOT / "docs" / "tutorials" / "notebook.md"
+    names: dict[str, Any] = {"__name__": "notebook"}
+    for cell in blocks(page, "python"):
+        program = reduce(lambda text, change: text.replace(*change), shorter.items(), cell)
+        exec(compile(program, page.name, "exec"), names)
+    shown = capsys.readouterr().out
+    assert "'dealy', nearest is 'delay'" in shown and "8 of 8 runs\n" in shown
+    assert names["means"].loc["20ms", "0%"] - names["means"].loc["0ms", "0%"] == pytest.approx(20.0, abs=1.0)
+    assert (tmp_path / "radio.png").stat().st_size > 10_000 and len(names["ball"]) == 11
+    names["plt"].close("all")
+
+
+def test_the_study_file_of_the_page_is_valid(tmp_path: Path) -> None:
+    (tmp_path / "deploy").symlink_to(ROOT / "deploy")
+    (text,) = blocks(ROOT / "docs" / "how-to" / "run_a_study.md", "yaml")
+    (tmp_path / "study.yaml").write_text(text)
+    found = read_study(tmp_path / "study.yaml")
+    assert found is not None
+    file, seeds = tmp_path / found.deployment, seeds_of(str(found.seeds))
+    study = study_of(file, found.duration, found.vary, seeds, found.sets)
+    assert len(study.combinations) * len(study.seeds) == 120
 
 
 def test_a_players_declaration_is_valid() -> None:

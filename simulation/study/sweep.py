@@ -29,8 +29,8 @@ LIMIT_S: Final = 3600.0
 
 @dataclass(slots=True)
 class Progress:
-    """How far a sweep is: runs of the study, those that the results had before, those that ended since `begun_s`, all
-    failed ones of the results, and the wall time of the ended ones in all."""
+    """How far a sweep is: runs of the study, rows that the results had before, runs that ended since `begun_s` and
+    their wall time in all, failed runs of both."""
 
     runs: int
     known: int
@@ -77,7 +77,9 @@ class Results:
 
     def _take(self, path: Path, table: Table) -> None:
         if {*table.parameters} != {*self.table.parameters}:
-            raise OtherStudy(f"{path}: its parameters are {', '.join(table.parameters) or 'none'}")
+            raise OtherStudy(
+                f"{path}: results of another study: its parameters are {', '.join(table.parameters) or 'none'}"
+            )
         for number, row in enumerate(table.rows, 1):
             for name, own in self._identity.items():
                 if row[name] != own:

@@ -122,7 +122,7 @@ class Weather:
     def act(self) -> None:
         ear, hand = self.clients["ear"], self.clients["hand"]
         if ear.statistics().downlinks:
-            ear.report({"tick": float(self.air.tick), "constant": 1.0})
+            ear.report({"tick": float(self.air.tick)})
             ear.send(packets_of(self.air.tick))
         if hand.go is not None:
             hand.report({"tick": float(hand.go.tick)})
@@ -235,6 +235,28 @@ def test_what_waits_to_be_recorded_is_bounded(monkeypatch: pytest.MonkeyPatch) -
     assert state is not None and state.members["ear"].sequence == 4
     ear.send(packets_of(9))
     assert ear.statistics().sent == 6, "there is room again"
+
+
+def test_a_free_running_client_reports_again_what_a_vhub_has_lost_and_late_reports_count_no_more() -> None:
+    air = Storm()
+    air.start()
+    ear = air.enter("ear", 0)
+    ear.report({"trips": 1.0, "way": 2.0})
+    air.carry(ear)
+    air.die([ear])  # before a tick was closed
+    ear.report({"turns": 5.0})
+    air.come_back()
+    air.settle(ear)
+    ear.report({"trips": 2.0})
+    late = published(ear)
+    ear.report({"trips": 3.0})
+    air.carry(ear)
+    carry_up(air, late)
+    ear.report({"trips": 3.0})
+    assert published(ear) == [], "nothing is new"
+    air.close()
+    state = air.hub.state
+    assert state is not None and state.metrics.reported == {"ear": {"trips": 3.0, "way": 2.0, "turns": 5.0}}
 
 
 def test_the_end_of_a_run_is_heard_whatever_its_number() -> None:

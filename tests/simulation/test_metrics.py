@@ -47,6 +47,8 @@ class Reporter(Player):
         turn = Turn({self.robots[0]: {"slide": 0.02 * (tick // 40 % 2), "spin": 0.0}})
         if self._reports == "well":
             turn.report("tick", tick)
+            if tick == 10:
+                turn.report("once", 0.5)
             turn.report("is_odd", np.bool_(tick // 20 % 2 == 1))  # type: ignore[arg-type]
         elif tick >= 20:
             self._report_badly(turn, tick)
@@ -122,9 +124,16 @@ def test_metrics_are_the_same_on_any_nodes_and_through_faults(
     metrics = calm.json["metrics"]
     assert faulty.json["metrics"] == metrics
     assert metrics["players.reporter.tick"] == 550.0 and metrics["players.reporter.is_odd"] == 1.0
+    assert metrics["players.reporter.once"] == 0.5, "by a player of before, and a vHub of before"
     assert metrics["score.red"] == 0 and metrics["is_over"] == 0, "status values of rules"
     assert 0.0 < metrics["network.encoder.loss"] < 0.1 < metrics["network.encoder.delay_ms"] < 5.0
     assert metrics["network.encoder.age_ms"] >= 2.0
+
+
+def test_a_run_has_a_bounded_number_of_metrics(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "METRICS_OF_RUN_MAX", 2)
+    result = run().json
+    assert result["failed"] and result["reason"] == "reporter reports more metrics; a run has at most 2"
 
 
 def test_a_report_changes_neither_the_world_nor_the_fate_of_a_packet(captured: tuple[Rehearsed, Path]) -> None:
@@ -175,6 +184,7 @@ def test_the_console_plots_the_metrics_of_a_capture(captured: tuple[Rehearsed, P
     assert seen == run.json["metrics"]
     assert status_at(history.recording, {}, 498, None)["metrics"] == {
         "players.reporter.is_odd": 0.0,
+        "players.reporter.once": 0.5,
         "players.reporter.tick": 490.0,
     }
     odd = curve_points(history, Curve("a", status="metrics.players.reporter.is_odd"), TICKS)

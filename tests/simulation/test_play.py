@@ -130,7 +130,7 @@ def test_a_listener_hears_all_that_was_delivered_in_order(run: Path) -> None:
         assert len(scenes) == 2 and scenes[0].time_ns == 0 and b"ball-2" in scenes[1].update
         assert any(item.text.startswith("supervisor: ") for item in items if isinstance(item, PlayedLine))
         rows = [item for item in items if isinstance(item, PlayedRow)]
-        assert {row.topic for row in rows} == {"ages", "clients", "epochs", "layout"}
+        assert {row.topic for row in rows} == {"ages", "clients", "epochs", "layout", "metrics"}
         assert msgspec.json.decode(rows[0].row)["tick"] == 0
         assert isinstance(items[-1], ReplayClock) and items[-1].state == "ended" and heard.ended
         result = play.result()

@@ -103,7 +103,7 @@ def test_poses_and_rows_are_played_as_they_stand(run: Path) -> None:
         (position,) = (pose.position for pose in message.poses if pose.link == "ball")
         assert message.time_ns not in at or position == tuple(at[message.time_ns])
     rows = [decode(PlayedRow, entry.payload) for entry in entries if entry.stream == ROWS]
-    assert Counter(row.topic for row in rows) == {"clients": 2, "epochs": 1, "layout": 1, "ages": 10}
+    assert Counter(row.topic for row in rows) == {"clients": 2, "epochs": 1, "layout": 1, "ages": 10, "metrics": 8}
     theirs = [message.data for message in messages_of(run) if message.topic == "/clients"]
     assert [row.row for row in rows if row.topic == "clients"] == theirs
 

@@ -35,7 +35,7 @@ class Metrics:
 
     def counts(self, channel: str) -> ChannelCounts:
         """Return the counts of a channel."""
-        if len(self.channels) >= limits.METRIC_CHANNELS_MAX:
+        if channel not in self.channels and len(self.channels) >= limits.METRIC_CHANNELS_MAX:
             channel = OTHERS
         return self.channels.setdefault(channel, ChannelCounts())
 

@@ -56,4 +56,6 @@ class Dispatch(Player):
         known = sorted((now_s - sent_s, number) for number, (sent_s, _) in self.fleet.items())
         newest = [(age, self.fleet[number][1]) for age, number in known if age <= FORGOTTEN_S][:ENTRIES_MAX]
         entries = [Entry(telemetry.number, telemetry.here, telemetry.goal, age) for age, telemetry in newest]
-        return Turn({}, [Packet("", FLEET, encode_fleet(entries))] if entries else [])
+        turn = Turn({}, [Packet("", FLEET, encode_fleet(entries))] if entries else [])
+        turn.report("rovers_heard", len(newest))
+        return turn
