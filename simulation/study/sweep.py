@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from foosim.capture.new_file import check_writable
-from foosim.common.errors import BadValue, Refused
+from foosim.common.errors import BadValue, Failed, Refused
 from foosim.simulation.study.run import OtherVersion, Ran, Run, ran
 from foosim.simulation.study.study import SEED, Study
 from foosim.simulation.study.table import Row, Table, check_results, read_table, write_table
@@ -68,10 +68,13 @@ class Results:
         """Raises BadValue, Failed and OtherStudy for a file that cannot have the results."""
         self.table, self._path, self._written_s = Table(study.parameters), path, 0.0
         self._identity = {"study": study.identity(), "foosim": study.version}
+        self._seen: tuple[int, int] | None = None
+        """What identifies the file as it was read or written last; None without one."""
         if path is not None:
             check_results(path)
             check_writable(path)
             if path.exists():
+                self._seen = _identifies(path)
                 self._take(path, read_table(path))
         self.runs = {(*values, seed): study.run(values, seed) for values in study.combinations for seed in study.seeds}
         known = {self.table.key(row) for row in self.table.rows}
@@ -104,7 +107,18 @@ class Results:
         order = {key: number for number, key in enumerate(self.runs)}
         self.table.rows.sort(key=lambda row: order.get(self.table.key(row), len(order)))
         if self._path is not None and self.table.rows:
+            if _identifies(self._path) not in (None, self._seen):
+                raise Failed(f"{self._path}: another process has written it meanwhile; two sweeps need two files")
             write_table(self._path, self.table)
+            self._seen = _identifies(self._path)
+
+
+def _identifies(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return None
+    return found.st_ino, found.st_mtime_ns
 
 
 def sweep(

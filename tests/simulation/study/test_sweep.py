@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import foosim
-from foosim.common.errors import BadValue, DeploymentError, Refused
+from foosim.common.errors import BadValue, DeploymentError, Failed, Refused
 from foosim.simulation.study.run import OtherVersion, Ran
 from foosim.simulation.study.study import Study, seeds_of, study_of, text_of, values_of
-from foosim.simulation.study.sweep import Progress, sweep
+from foosim.simulation.study.sweep import Progress, Results, sweep
 from foosim.simulation.study.table import Table, read_table, write_table
 from foosim.simulation.workers import executor_here
 
@@ -209,6 +209,15 @@ def test_results_of_another_study_version_or_place_are_refused_before_anything_r
     for damaged, problem in (cut, "row 8: foosim is no text"), (twice, "row 9: an earlier row has its parameters"):
         out.write_bytes(damaged)
         assert problem in refused(study(VARY, [1, 2]))
+
+
+def test_a_file_that_another_sweep_writes_keeps_its_rows(tmp_path: Path) -> None:
+    out = tmp_path / "results.csv"
+    first, second = Results(study({}, [1]), out), Results(study({}, [2]), out)
+    second.add((2,), Ran({}, ""))
+    with pytest.raises(Failed, match="another process has written it"):
+        first.add((1,), Ran({}, ""))
+    assert [row["seed"] for row in read_table(out).rows] == [2]
 
 
 def test_values_are_texts_of_set_and_ranges_are_whole_numbers() -> None:
