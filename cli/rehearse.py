@@ -30,7 +30,7 @@ from foosim.protocol.run_status import reported_text
 from foosim.runtime.command import DONE, FAILED, JsonOption, new_app, print_json
 from foosim.simulation.attendant import Interrupts
 from foosim.simulation.check.component_check import ComponentCheck, used_component_type
-from foosim.simulation.run import rehearse
+from foosim.simulation.run import check_lockstep, rehearse
 from foosim.simulation.system import Settings
 from foosim.vhub.links.summary import summaries
 from foosim.vhub.links.summary_text import start_lines
@@ -64,9 +64,7 @@ def rehearse_command(
         raise BadValue(f"--nodes: out of range 1 to {limits.NODES_MAX}", nodes)
     plan = make_plan(replace(options, pace="fast", listen=LOOPBACK))
     check_models_here(plan)
-    free = sorted(name for name, player in plan.deployment.players.items() if not player.lockstep)
-    if free:
-        raise BadValue("a rehearsal has lockstep players only; these are free-running", ", ".join(free))
+    check_lockstep(plan.deployment)
     check_players_here(plan)
     for warning in check_rooms(plan.deployment.capture, capture, None):
         _note(f"warning: {warning}")

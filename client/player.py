@@ -9,10 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from numbers import Real
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat, TypeAlias
 
-import numpy as np
 from msgspec import Struct
 from mypy_extensions import mypyc_attr
 
@@ -93,8 +91,8 @@ def metric_of(name: object, value: object) -> float:
     if not isinstance(name, str) or not is_name(name):
         raise BadValue(f"not a name of a metric: {NAME_RULE}", name)
     try:
-        number = float(value) if isinstance(value, (Real, np.bool_)) else None
-    except OverflowError:
+        number = float(value) if isinstance(value, (float, int, SupportsFloat)) else None
+    except (OverflowError, TypeError):
         number = None
     if number is None or not isfinite(number):
         raise BadValue(f"metric {name} is no finite int, float or bool", value)

@@ -14,6 +14,7 @@ from typing import Any
 from foosim.capture.contents import ending_metadata, origin_metadata
 from foosim.capture.mcap.checks import CaptureError
 from foosim.capture.parts import first_there
+from foosim.common.errors import BadValue
 from foosim.common.units import Pace
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, load_deployment, with_owners
@@ -73,12 +74,13 @@ def rehearse(  # noqa: PLR0913  # options of a rehearsal, by keyword
     one that cannot be interrupted `on_stuck` gets the result, from another thread, and should end the process.
     A player that fails ends the run in order, as in processes: the result has `failed` and the reason.
     Raises DeploymentError for a bad text, AssetError for a bad file, CaptureError when `capture` exists or cannot be
-    written, BadValue for a `start` that does not fit.
+    written, BadValue for a `start` that does not fit and for free-running players.
     """
     text = apply_sets(text, name, sets) if nodes is None else with_nodes(text, name, nodes, sets)
     text, files = pin_assets(text, name, folder or Path())
     deployment = load_deployment(text, name).with_assets(files)
     check_shapes(deployment, name, text)
+    check_lockstep(deployment)
     settings = settings or Settings()
     rehearsed = Rehearsed({})
     on_commit = settings.on_commit
@@ -97,6 +99,13 @@ def rehearse(  # noqa: PLR0913  # options of a rehearsal, by keyword
         prepare(system)
     rehearsed.json, rehearsed.answers = _run(system, writer, capture, progress, on_stuck), system.answers
     return rehearsed
+
+
+def check_lockstep(deployment: Deployment) -> None:
+    """Raise BadValue for free-running players, which a rehearsal cannot have."""
+    free = sorted(name for name, player in deployment.players.items() if not player.lockstep)
+    if free:
+        raise BadValue("a rehearsal has lockstep players only; these are free-running", ", ".join(free))
 
 
 def _run(

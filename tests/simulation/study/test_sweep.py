@@ -154,6 +154,9 @@ def test_an_executor_that_ends_or_has_another_version_makes_no_row(tmp_path: Pat
 def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why(executor: Executor) -> None:
     rows = sweep(study({"table.ball.mass": ["heavy", "21 g"]}), executor).rows
     assert "table.ball.mass" in rows[0]["message"] and not rows[1]["message"]
+    free = "{class: 'tests.waving:Waver', rate: 50 Hz, lockstep: false, robots: {red.goal: [encoder]}}"
+    (row,) = sweep(study({"players.player-red": [free]}), executor).rows
+    assert row["message"] == "a rehearsal has lockstep players only; these are free-running, 'player-red'"
 
 
 @pytest.mark.parametrize(
