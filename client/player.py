@@ -12,6 +12,7 @@ from math import isfinite
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+import numpy as np
 from msgspec import Struct
 from mypy_extensions import mypyc_attr
 
@@ -92,7 +93,7 @@ def metric_of(name: object, value: object) -> float:
     if not isinstance(name, str) or not is_name(name):
         raise BadValue(f"not a name of a metric: {NAME_RULE}", name)
     try:
-        number = float(value) if isinstance(value, Real) else None
+        number = float(value) if isinstance(value, (Real, np.bool_)) else None
     except OverflowError:
         number = None
     if number is None or not isfinite(number):
