@@ -102,9 +102,13 @@ def _study(options: SweepOptions) -> Study:
         seeds = str(known.seeds) if seeds is None else seeds
     if duration is None:
         raise BadValue("--for is missing: the simulated time of each run, e.g. --for 60s")
+    given: set[str] = set()
     for one in options.vary:
         path, equals, values = one.partition("=")
         if not equals:
             raise BadValue("--vary: not of the form PATH=VALUE,VALUE", one)
+        if path in given:
+            raise BadValue("--vary: the parameter is there twice", path)
+        given.add(path)
         vary[path] = [*read_at(f"--vary: {path}", values_of, values)]
     return study_of(file, duration, vary, read_at("--seeds", seeds_of, "1" if seeds is None else seeds), sets)

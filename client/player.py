@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from numbers import Real
+from sys import modules
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from msgspec import Struct
@@ -91,8 +92,10 @@ def metric_of(name: object, value: object) -> float:
     """Return the value of a metric as a number. Raises BadValue as `Turn.report`."""
     if not isinstance(name, str) or not is_name(name):
         raise BadValue(f"not a name of a metric: {NAME_RULE}", name)
+    numpy: Any = modules.get("numpy")  # loaded where the value is of it: it takes long to import
     try:
-        number = float(value) if isinstance(value, Real) else None
+        is_number = isinstance(value, Real) or (numpy is not None and isinstance(value, numpy.bool_))
+        number = float(value) if is_number else None  # type: ignore[arg-type]
     except OverflowError:
         number = None
     if number is None or not isfinite(number):

@@ -14,7 +14,7 @@ from foosim.client.core import NEVER_NS, ClientCore
 from foosim.client.errors import PacketError, PlayerError, Unanswered
 from foosim.client.loading import load_player
 from foosim.client.packets import check_packet
-from foosim.client.player import Packet, Player, Sample, Turn, keep_metrics
+from foosim.client.player import Packet, Player, Sample, Turn, keep_metrics, metric_of
 from foosim.common.errors import BadValue, Malformed, Refused, UnknownName
 from foosim.deployment.channel_kinds import Channel, channels_of
 from foosim.deployment.schema import Deployment
@@ -123,8 +123,9 @@ class Acting:
         if not isinstance(turn, Turn):
             turn = Turn(turn)
         elif turn.metrics:
+            metrics: Mapping[Any, Any] = turn.metrics  # which players also fill without `report`
             try:
-                keep_metrics(self.metrics, turn.metrics)
+                keep_metrics(self.metrics, {name: metric_of(name, value) for name, value in metrics.items()})
             except BadValue as error:
                 raise PlayerError(f"{where}: {error}{place_of_code(self.player.act)}") from error
         return [*self._packets(turn.packets, where), *self._commands(turn.commands, where)]

@@ -14,7 +14,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from subprocess import DEVNULL, Popen
@@ -70,12 +70,19 @@ class Child:
                 raise Lost(f"not done after {limit_s:g} s of wall time, its process was killed")
             return self._connection.recv()
         except (EOFError, ConnectionError):
-            raise Lost(f"its process {_ending(self._process.wait())}") from None
+            code = self._process.wait()
+            self._end_group()
+            raise Lost(f"its process {_ending(code)}") from None
 
     def end(self) -> None:
-        """End the process now."""
-        self._process.kill()
+        """End the process now, and the processes that it has started."""
+        if self._process.returncode is None:
+            self._end_group()
         self._process.wait()
+
+    def _end_group(self) -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
 
     def __del__(self) -> None:
         self.end()
@@ -160,7 +167,9 @@ def serve() -> None:
     global _answers  # noqa: PLW0603  # one in a process, as standard output is
     number, parent = map(int, sys.argv[1:])
     end_with(parent)
+    os.set_inheritable(number, False)
     _answers = Connection(number)
+    os.register_at_fork(after_in_child=_answers.close)  # what the work forks does not answer in place of this process
     while _answers.poll(IDLE_S):
         try:
             packed = _answers.recv_bytes()

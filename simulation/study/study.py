@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import numpy as np
 import yaml
 
 from foosim.client.loading import look_in
@@ -103,11 +104,15 @@ def study_of(
     ticks = -(-parse_ns(duration) // deployment.tick_ns)
     if ticks < 1:
         raise BadValue("the simulated time of a run is a tick or more", duration)
+    for path, given in vary.items():
+        if isinstance(given, str):
+            raise BadValue(f"{path}: a text, where its values are needed one by one", given)
     values = {path: tuple(map(text_of, given)) for path, given in vary.items()}
+    seeds = [_plain(seed) for seed in seeds]
     for what, listed in (*values.items(), ("seeds", tuple(map(str, seeds)))):
         if not listed or len(set(listed)) != len(listed):
             raise BadValue(f"{what}: {'a value is there twice' if listed else 'there is no value'}", ",".join(listed))
-    if SEED in values:
+    if SEED in values or any(one.partition("=")[0] == SEED for one in sets):
         raise BadValue("the seed is no parameter: it has its own option", SEED)
     if (runs := prod(map(len, values.values())) * len(seeds)) > RUNS_MAX:
         raise BadValue(f"more than {RUNS_MAX} runs", runs)
@@ -155,8 +160,18 @@ def read_study(file: Path) -> StudyFile | None:
 
 
 def text_of(value: object) -> str:
-    """Return a value as the text that `--set` takes."""
-    return value if isinstance(value, str) else yaml.safe_dump(value, default_flow_style=True).split("\n...")[0].strip()
+    """Return a value as the text that `--set` takes. Raises BadValue for one that YAML has not."""
+    if isinstance(value, str):
+        return str(value)
+    try:
+        return yaml.safe_dump(_plain(value), default_flow_style=True).split("\n...")[0].strip()
+    except yaml.YAMLError:
+        raise BadValue("not a value of a deployment, a number, text, list or mapping", repr(value)) from None
+
+
+def _plain(value: Any) -> Any:
+    """Return a number or an array of numpy as Python's."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
 def values_of(text: str) -> list[str]:

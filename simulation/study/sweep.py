@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from foosim.capture.new_file import check_writable
-from foosim.common.errors import Refused
+from foosim.common.errors import BadValue, Refused
 from foosim.simulation.study.run import OtherVersion, Ran, Run, ran
 from foosim.simulation.study.study import SEED, Study
 from foosim.simulation.study.table import Row, Table, check_results, read_table, write_table
@@ -25,6 +25,8 @@ Key = TypeVar("Key")
 
 WRITE_S: Final = 1.0
 LIMIT_S: Final = 3600.0
+LIMIT_S_MAX: Final = 1_800_000.0
+"""500 hours: milliseconds of a wait are a C int."""
 
 
 @dataclass(slots=True)
@@ -119,6 +121,8 @@ def sweep(
     worker with another version of foosim, BrokenExecutor for an executor that ends. What has run is in the file then,
     and after Ctrl-C.
     """
+    if not 0.0 < limit_s <= LIMIT_S_MAX:
+        raise BadValue(f"the wall time of a run is limited to more than 0 s, at most {LIMIT_S_MAX:g} s", limit_s)
     results = Results(study, out)
     failed = sum(bool(row["message"]) for row in results.table.rows)
     so_far = Progress(len(results.runs), len(results.runs) - len(results.missing), time.monotonic(), failed=failed)

@@ -110,10 +110,18 @@ def read_table(path: Path) -> Table:
     if columns[-len(LAST) :] != list(LAST) or SEED not in columns:
         raise BadValue(f"{path}: not a results file of a sweep, which has a row or more and the columns seed to foosim")
     table = Table(tuple(columns[: columns.index(SEED)]))
-    try:
-        table.rows = [_read_row(table.parameters, row) for row in rows]
-    except ValueError as error:
-        raise BadValue(f"{path}: {error}") from None
+    known: set[tuple[Any, ...]] = set()
+    for number, row in enumerate(rows, 1):
+        try:
+            if row.keys() != rows[0].keys():
+                raise ValueError("its columns are not those of the first row")
+            found = _read_row(table.parameters, row)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise BadValue(f"{path}: row {number}: {error}") from None
+        if (key := table.key(found)) in known:
+            raise BadValue(f"{path}: row {number}: an earlier row has its parameters and its seed")
+        known.add(key)
+        table.rows.append(found)
     return table
 
 
@@ -130,11 +138,16 @@ def _rows(path: Path) -> list[dict[str, Any]]:
 
 
 def _read_row(parameters: Sequence[str], row: Mapping[str, Any]) -> Row:
-    """Return a row with numbers for texts, as of CSV; figures that a failed run lacks are left out."""
+    """Return a row with numbers for texts, as of CSV; figures that a failed run lacks are left out.
+
+    Raises ValueError, TypeError and OverflowError for a value of another type.
+    """
     found: Row = {}
     for name, value in row.items():
         if name in parameters or name in TEXTS:
+            if not isinstance(value, str):
+                raise ValueError(f"{name} is no text")
             found[name] = value
-        elif value not in ("", None):
+        elif name == SEED or value not in ("", None):
             found[name] = int(value) if name in (SEED, *COUNTS) else float(value)
     return found

@@ -109,7 +109,7 @@ def test_bad_input_is_refused_and_draws_nothing(
     (folder / "empty.csv").write_text(results.read_text().splitlines()[0] + "\n")
     write_table(
         folder / "seeds.csv",
-        Table((), [{name: one[name] for name in one if name not in (DELAY, TEAM)} for one in ROWS]),
+        Table((), [{name: one[name] for name in one if name not in (DELAY, TEAM)} for one in ROWS[:2]]),
     )
     done = typed("sweep", verb)(*words)
     assert done.code == (1 if words == ["none.csv"] else 2) and problem in done.err and "Traceback" not in done.err

@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Any, Final
 
+import numpy as np
 import pytest
 
 from foosim.capture.cut import cut_capture
@@ -48,7 +49,7 @@ class Reporter(Player):
             turn.report("tick", tick)
             if tick == 10:
                 turn.report("once", 0.5)
-            turn.report("is_odd", tick // 20 % 2 == 1)
+            turn.report("is_odd", np.bool_(tick // 20 % 2 == 1))  # type: ignore[arg-type]
         elif tick >= 20:
             self._report_badly(turn, tick)
         return turn
@@ -60,6 +61,8 @@ class Reporter(Player):
             turn.report("a.b", 1)
         elif self._reports == "text":
             turn.report("speed", "fast")  # type: ignore[arg-type]
+        elif self._reports == "unchecked":
+            turn.metrics["speed"] = "fast"  # type: ignore[assignment]
         elif self._reports == "many":
             for number in range(limits.METRICS_MAX + 1):
                 turn.report(f"metric-{number}", number)
@@ -146,6 +149,7 @@ def test_a_report_changes_neither_the_world_nor_the_fate_of_a_packet(captured: t
         ("nan", "BadValue: metric speed is no finite int, float or bool, nan"),
         ("text", "BadValue: metric speed is no finite int, float or bool, 'fast'"),
         ("name", "BadValue: not a name of a metric: a name is a lower case letter, "),
+        ("unchecked", "metric speed is no finite int, float or bool, 'fast'"),
         ("many", "a client reports at most 64 metrics; one more is, 'metric-64'"),
     ],
 )

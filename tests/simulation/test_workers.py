@@ -6,6 +6,7 @@ import os
 import signal
 from math import sqrt
 from pathlib import Path
+from select import select
 from time import sleep
 
 from foosim.simulation.workers import Lost, apart, executor_here
@@ -42,6 +43,29 @@ def test_a_child_that_dies_or_hangs_costs_its_work_only() -> None:
         assert str(killed.exception()) == "its process was killed by SIGKILL"
         assert isinstance(killed.exception(), Lost)
     assert children() == before
+
+
+def test_what_work_forks_neither_answers_nor_outlives_the_child() -> None:
+    with executor_here(1) as pool:
+        pool.submit(apart, forks, 0.0).result()
+        assert pool.submit(apart, sqrt, 9.0).result() == 3.0
+        there = os.pidfd_open(pool.submit(apart, forks, 600.0).result())
+        died = pool.submit(apart, forks_and_exits, 600.0, 10.0)
+        assert str(died.exception()) == "its process ended with exit code 3"
+    assert select([there], [], [], 10.0)[0]
+
+
+def forks(time_s: float) -> int:
+    """Return the process of a fork that sleeps, and then returns as well."""
+    if pid := os.fork():
+        return pid
+    sleep(time_s)
+    return 0
+
+
+def forks_and_exits(time_s: float) -> None:
+    if forks(time_s):
+        os._exit(3)
 
 
 def test_the_end_of_a_pool_ends_work_that_runs() -> None:

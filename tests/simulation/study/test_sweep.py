@@ -168,6 +168,8 @@ def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why(execu
         ({"robots.*.sensors.encoder.raet": ["5Hz"]}, [1], DeploymentError, "nearest is 'rate'"),
         ({DELAY: []}, [1], BadValue, f"{DELAY}: there is no value"),
         ({DELAY: ["1ms", "1ms"]}, [1], BadValue, f"{DELAY}: a value is there twice, '1ms,1ms'"),
+        ({DELAY: "1ms"}, [1], BadValue, f"{DELAY}: a text"),
+        ({DELAY: [object()]}, [1], BadValue, "not a value of a deployment"),
         ({}, [], BadValue, "seeds: there is no value"),
         ({"seed": [1]}, [1], BadValue, "the seed is no parameter"),
     ],
@@ -178,6 +180,11 @@ def test_a_study_that_cannot_be_run_is_refused(
     with pytest.raises(error) as refused:
         study(vary, seeds)
     assert problem in str(refused.value)
+
+
+def test_a_seed_among_the_sets_is_refused() -> None:
+    with pytest.raises(BadValue, match="the seed is no parameter"):
+        study({}, [1], "seed=2")
 
 
 def test_results_of_another_study_version_or_place_are_refused_before_anything_runs(
@@ -198,17 +205,26 @@ def test_results_of_another_study_version_or_place_are_refused_before_anything_r
     assert "row 1 is of another version of foosim, 0.2.0+" in refused(study(VARY, [1, 2]))
     assert out.read_bytes() == before
     assert "cannot be written" in refused(study(VARY), tmp_path / "nowhere" / "results.csv")
+    with pytest.raises(BadValue, match="more than 0 s"):
+        sweep(study(VARY), None, limit_s=0.0)  # type: ignore[arg-type]
     assert "ends with .csv, .jsonl, .parquet" in refused(study(VARY), tmp_path / "results.txt")
     out.write_text("a,b\n1,2\n")
     assert "not a results file of a sweep" in refused(study(VARY))
+    cut, twice = before.rpartition(b",")[0], before + before.splitlines(keepends=True)[1]
+    for damaged, problem in (cut, "row 8: foosim is no text"), (twice, "row 9: an earlier row has its parameters"):
+        out.write_bytes(damaged)
+        assert problem in refused(study(VARY, [1, 2]))
 
 
 def test_values_are_texts_of_set_and_ranges_are_whole_numbers() -> None:
     assert values_of("10ms, [1, 2],'a,b',1..3,{k: 1}") == ["10ms", "[1, 2]", "'a,b'", "1", "2", "3", "{k: 1}"]
-    assert [text_of(value) for value in (0.5, True, None, "1 m", [1, 2])] == ["0.5", "true", "null", "1 m", "[1, 2]"]
+    assert [text_of(value) for value in (np.float64(0.5), True, None, "1 m", np.arange(1, 3))] == [
+        *("0.5", "true", "null", "1 m", "[1, 2]")
+    ]
     assert seeds_of("1..3,7") == [1, 2, 3, 7]
     for bad in ("", "5..1", "[1", "1]", "1,,2"):
         with pytest.raises(BadValue):
             values_of(bad)
+    assert type(study({}, np.arange(2)).seeds[0]) is int  # type: ignore[arg-type]
     with pytest.raises(BadValue, match="not a seed"):
         seeds_of("1..3,x")
