@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple, SupportsFloat, TypeAlias
+from numbers import Real
+from sys import modules
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from msgspec import Struct
 from mypy_extensions import mypyc_attr
@@ -90,9 +92,11 @@ def metric_of(name: object, value: object) -> float:
     """Return the value of a metric as a number. Raises BadValue as `Turn.report`."""
     if not isinstance(name, str) or not is_name(name):
         raise BadValue(f"not a name of a metric: {NAME_RULE}", name)
+    numpy: Any = modules.get("numpy")  # loaded where the value is of it: it takes long to import
     try:
-        number = float(value) if isinstance(value, (float, int, SupportsFloat)) else None
-    except (OverflowError, TypeError):
+        is_number = isinstance(value, Real) or (numpy is not None and isinstance(value, numpy.bool_))
+        number = float(value) if is_number else None  # type: ignore[arg-type]
+    except OverflowError:
         number = None
     if number is None or not isfinite(number):
         raise BadValue(f"metric {name} is no finite int, float or bool", value)

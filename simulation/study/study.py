@@ -7,6 +7,7 @@ so that a study can be extended.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import blake2b
@@ -137,6 +138,10 @@ def _check_parameters(study: Study) -> None:
         else:
             return
     assert refused is not None
+    for number, path in enumerate(study.vary, 1):
+        refused = DeploymentError(
+            [re.sub(rf"^--set:{number}:\d+", f"--vary {path}", line) for line in refused.problems]
+        )
     raise refused
 
 

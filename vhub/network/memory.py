@@ -231,21 +231,12 @@ class Age(msgspec.Struct, frozen=True):
     counts: Counts
 
 
-class ChannelCounts(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """What became of the packets of a channel over all links, without duplicates that links made."""
-
-    delivered: int = 0
-    dropped: int = 0
-    delay_ns: int = 0
-    """Sum of (due - sent) over delivered packets."""
-
-
 class MetricsState(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """The metrics of a run: the last values that each client reported, the counts of each channel, and the network's
-    figures in the last rows of them."""
+    """The metrics of a run: the last values that each client reported, the `ChannelCounts` of each channel, and
+    the network's figures in the last rows of them."""
 
     reported: list[tuple[str, dict[str, float]]]
-    channels: list[tuple[str, ChannelCounts]]
+    channels: list[tuple[str, int, int, int]]
     taken: dict[str, float]
 
 

@@ -103,6 +103,15 @@ def received(flights: Iterable[Flight]) -> list[Received]:
     return [Received(f.source, f.sequence, f.copy, f.channel, f.sent_ns, f.due_ns, content_of(f)) for f in flights]
 
 
+class ChannelCounts:
+    """What became of the packets of a channel over all links, without duplicates that links made."""
+
+    def __init__(self, delivered: int = 0, dropped: int = 0, delay_ns: int = 0) -> None:
+        self.delivered, self.dropped = delivered, dropped
+        self.delay_ns = delay_ns
+        """Sum of (due - sent) over delivered packets."""
+
+
 order_of: Final = attrgetter("due_ns", "source", "sequence", "copy", "destination")
 """The order of arrivals at one tick; the receiver distinguishes the copies of a broadcast."""
 

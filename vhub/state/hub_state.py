@@ -23,8 +23,8 @@ from foosim.protocol.messages import Deliveries, Sent
 from foosim.vhub.links.fabric import Fabric, Link
 from foosim.vhub.network.ages import Ages
 from foosim.vhub.network.draw_address import counts_within_channels, robot_number
-from foosim.vhub.network.memory import Age, ChannelCounts, Joining, Snapshot
-from foosim.vhub.network.packet import Flight, Packets, content_of, flight_of, order_of, state_of
+from foosim.vhub.network.memory import Age, Joining, Snapshot
+from foosim.vhub.network.packet import ChannelCounts, Flight, Packets, content_of, flight_of, order_of, state_of
 from foosim.vhub.stages.receiver import RECEIVER_DOWN, RECEIVER_FULL, TRANSIT_FULL
 from foosim.vhub.state.byte_limits import InFlightLimit, ReceiveBudget
 from foosim.vhub.state.existence import Existence
@@ -437,7 +437,8 @@ class HubState:
 
     def _counts(self, channel: str) -> ChannelCounts:
         """Return the counts of a channel."""
-        return self._channels.get(channel) or self.metrics.counts(channel)
+        counts = self._channels.get(channel)
+        return self.metrics.counts(channel) if counts is None else counts
 
     def _take_arrivals(self, tick: int, to_robots: bool) -> list[Flight]:
         """Remove and return the arrivals of `tick` at robots, or at clients, in (due, source, sequence, copy) order."""

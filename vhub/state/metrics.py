@@ -6,7 +6,8 @@ from typing import Final, NamedTuple
 
 from foosim.common import limits
 from foosim.vhub.network.ages import Ages
-from foosim.vhub.network.memory import ChannelCounts, MetricsState
+from foosim.vhub.network.memory import MetricsState
+from foosim.vhub.network.packet import ChannelCounts
 
 OTHERS: Final = "others"
 """The name under which channels above `METRIC_CHANNELS_MAX` are counted together."""
@@ -85,9 +86,10 @@ class Metrics:
     def state(self) -> MetricsState:
         """Return the snapshot."""
         reported = [(client, dict(sorted(metrics.items()))) for client, metrics in sorted(self.reported.items())]
-        return MetricsState(reported, sorted(self.channels.items()), dict(sorted(self._taken.items())))
+        counts = [(name, one.delivered, one.dropped, one.delay_ns) for name, one in sorted(self.channels.items())]
+        return MetricsState(reported, counts, dict(sorted(self._taken.items())))
 
     def restore(self, state: MetricsState) -> None:
         """Restore a snapshot."""
         self.reported, self._taken = dict(state.reported), state.taken
-        self.channels.update(state.channels)
+        self.channels.update({name: ChannelCounts(*counts) for name, *counts in state.channels})

@@ -162,7 +162,12 @@ def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why(execu
 @pytest.mark.parametrize(
     ("vary", "seeds", "error", "problem"),
     [
-        ({"network.links.0.dealy": ["0ms", "1ms"]}, [1], DeploymentError, "'dealy', nearest is 'delay'"),
+        (
+            {"network.links.0.dealy": ["0ms", "1ms"]},
+            [1],
+            DeploymentError,
+            "--vary network.links.0.dealy: network.links[0]: unknown key, 'dealy', nearest is 'delay'",
+        ),
         ({"robots.*.sensors.encoder.raet": ["5Hz"]}, [1], DeploymentError, "nearest is 'rate'"),
         ({DELAY: []}, [1], BadValue, f"{DELAY}: there is no value"),
         ({DELAY: ["1ms", "1ms"]}, [1], BadValue, f"{DELAY}: a value is there twice, '1ms,1ms'"),
