@@ -27,6 +27,7 @@ from foosim.common.units import parse_ns
 from foosim.deployment.assets import pin_assets
 from foosim.deployment.loader import apply_sets, check_engine, load_deployment
 from foosim.deployment.text.files import read_deployment_text, read_source_file
+from foosim.simulation.run import check_lockstep
 from foosim.simulation.study.run import Run, version_here
 
 SEED: Final = "seed"
@@ -122,26 +123,27 @@ def study_of(
 
 
 def _check_parameters(study: Study) -> None:
-    """Raise DeploymentError where the deployment refuses each combination that differs from the first in one value."""
+    """Raise Refused where neither the first combination nor one that differs from it in one value can be run."""
     first = study.combinations[0]
     others = [
         (*first[:place], value, *first[place + 1 :])
         for place, listed in enumerate(study.vary.values())
         for value in listed[1:]
     ]
-    refused: DeploymentError | None = None
+    refused: DeploymentError | BadValue | None = None
     for values in (first, *others):
         try:
-            apply_sets(study.text, study.name, study.run(values, study.seeds[0]).sets)
-        except DeploymentError as error:
-            refused = refused or error
-        else:
+            text = apply_sets(study.text, study.name, study.run(values, study.seeds[0]).sets)
+            check_lockstep(load_deployment(text, study.name))
             return
+        except (DeploymentError, BadValue) as error:
+            refused = refused or error
     assert refused is not None
-    for number, path in enumerate(study.vary, 1):
-        refused = DeploymentError(
-            [re.sub(rf"^--set:{number}:\d+", f"--vary {path}", line) for line in refused.problems]
-        )
+    if isinstance(refused, DeploymentError):
+        lines = refused.problems
+        for number, path in enumerate(study.vary, 1):
+            lines = tuple(re.sub(rf"^--set:{number}:\d+", f"--vary {path}", line) for line in lines)
+        raise DeploymentError(lines)
     raise refused
 
 

@@ -25,6 +25,8 @@ DELAY: Final = "network.links.0.delay"
 RATE: Final = "robots.*.sensors.encoder.rate"
 VARY: Final = {DELAY: ("0ms", "30ms"), RATE: ("100Hz", "50Hz")}
 PURE: Final = ("engine=pure",)
+RED: Final = "players.player-red"
+FREE: Final = "{class: 'tests.waving:Waver', rate: 50 Hz, lockstep: false, robots: {red.goal: [encoder]}}"
 PLAYER: Final = """
 from foosim import Player, Turn
 import math, os, time
@@ -154,9 +156,6 @@ def test_an_executor_that_ends_or_has_another_version_makes_no_row(tmp_path: Pat
 def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why(executor: Executor) -> None:
     rows = sweep(study({"table.ball.mass": ["heavy", "21 g"]}), executor).rows
     assert "table.ball.mass" in rows[0]["message"] and not rows[1]["message"]
-    free = "{class: 'tests.waving:Waver', rate: 50 Hz, lockstep: false, robots: {red.goal: [encoder]}}"
-    (row,) = sweep(study({"players.player-red": [free]}), executor).rows
-    assert row["message"] == "a rehearsal has lockstep players only; these are free-running, 'player-red'"
 
 
 @pytest.mark.parametrize(
@@ -175,6 +174,7 @@ def test_a_combination_that_the_deployment_refuses_has_a_row_that_says_why(execu
         ({DELAY: [object()]}, [1], BadValue, "not a value of a deployment"),
         ({}, [], BadValue, "seeds: there is no value"),
         ({"seed": [1]}, [1], BadValue, "the seed is no parameter"),
+        ({RED: [FREE]}, [1], BadValue, "these are free-running, 'player-red'"),
     ],
 )
 def test_a_study_that_cannot_be_run_is_refused(
