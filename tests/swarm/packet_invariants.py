@@ -198,12 +198,15 @@ class PacketLaws:
 
     @staticmethod
     def account(state: HubState) -> None:
-        """Law 5: offered = delivered + dropped + in flight, in total and by link; copies are in none of these."""
+        """Law 5: offered = delivered + dropped + in flight, in total, by link and by channel; copies are in none."""
         packets, flying = state.packets, [flight for flight in state.in_flight() if flight.copy == 0]
         hold(packets.in_flight == len(flying), f"{packets.in_flight} packets in flight, there are {len(flying)}")
         links = list(state.fabric.states.values())
         total = sum(link.offered for link in links), sum(link.delivered for link in links)
         hold(total == (packets.offered, packets.delivered), "the links' account is not that of all")
+        channels = list(state.metrics.channels.values())
+        total = sum(channel.delivered for channel in channels), sum(channel.dropped for channel in channels)
+        hold(total == (packets.delivered, packets.dropped), "the channels' account is not that of all")
         hold(all(link.offered >= link.delivered + link.dropped for link in links), "a link has more fates than packets")
 
     def end(self, system: System) -> None:
