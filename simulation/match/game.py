@@ -138,7 +138,8 @@ class Played:
 def run_of(fixture: Fixture, game: Game) -> Run:
     """Return a game as a run of a study."""
     sets = tuple(sets_of(fixture, game))
-    return Run(fixture.text, fixture.name, fixture.folder, sets, fixture.ticks, version_here(), game.capture)
+    capture = None if game.capture is None else game.capture.absolute()
+    return Run(fixture.text, fixture.name, fixture.folder.absolute(), sets, fixture.ticks, version_here(), capture)
 
 
 def played(fixture: Fixture, game: Game, found: Ran) -> Played:
