@@ -81,8 +81,8 @@ class _Progress:
     """Writes a line of progress a second."""
 
     def __init__(self) -> None:
-        self.last: Progress
-        self._line_s = time.monotonic() + LINE_S
+        self.last = Progress(0, 0, time.monotonic())
+        self._line_s = self.last.begun_s + LINE_S
 
     def take(self, progress: Progress) -> None:
         self.last = progress
