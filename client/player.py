@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
-from numbers import Real
-from sys import modules
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from msgspec import Struct
@@ -92,13 +90,11 @@ def metric_of(name: object, value: object) -> float:
     """Return the value of a metric as a number. Raises BadValue as `Turn.report`."""
     if not isinstance(name, str) or not is_name(name):
         raise BadValue(f"not a name of a metric: {NAME_RULE}", name)
-    numpy: Any = modules.get("numpy")  # loaded where the value is of it: it takes long to import
     try:
-        is_number = isinstance(value, Real) or (numpy is not None and isinstance(value, numpy.bool_))
-        number = float(value) if is_number else None  # type: ignore[arg-type]
-    except OverflowError:
-        number = None
-    if number is None or not isfinite(number):
+        number = nan if isinstance(value, str | bytes) else float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        number = nan
+    if not isfinite(number):
         raise BadValue(f"metric {name} is no finite int, float or bool", value)
     return number
 
